@@ -1,0 +1,36 @@
+"""Symbolic models: vehicles, earth-frame dynamics, the game, bases, and their compiled functions."""
+
+from .basis import Basis, drag, drag_cubic, find_function, quadratic
+from .errors import GammaTooSmallError, InputError, RunError, StationkeepError
+from .game import Game
+from .kernel import Export, Kernel
+from .model import Model, require_state
+from .problem import Problem, closed_form_problem
+from .riccati import game_riccati, gamma_star
+from .value import PointTerms, ValueFunctions
+from .vehicle import Thrusters, Vehicle
+
+__all__ = [
+    "Basis",
+    "Export",
+    "Game",
+    "GammaTooSmallError",
+    "InputError",
+    "Kernel",
+    "Model",
+    "PointTerms",
+    "Problem",
+    "RunError",
+    "StationkeepError",
+    "Thrusters",
+    "ValueFunctions",
+    "Vehicle",
+    "closed_form_problem",
+    "drag",
+    "drag_cubic",
+    "find_function",
+    "game_riccati",
+    "gamma_star",
+    "quadratic",
+    "require_state",
+]

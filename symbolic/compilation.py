@@ -1,0 +1,183 @@
+"""C code of a CasADi function, compiled into a content-addressed cache.
+
+The key is the SHA-256 of the generated C text (which is the whole graph), the compiler and its
+version, the flags, the machine and the CasADi version. An entry is a folder that holds the source,
+the shared library and a manifest with the library's own SHA-256. It is built under a temporary name
+and renamed, so that concurrent builds of one key both end with one whole entry; an entry whose
+manifest doesn't match its library is thrown away and built again. An entry is never overwritten in
+place: a library that is already loaded would silently keep answering for the new one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import logging
+import os
+import platform
+import shutil
+import subprocess
+import time
+import uuid
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import casadi
+import platformdirs
+
+logger = logging.getLogger("stationkeep")
+
+# -O2 without contraction of a*b+c is bit-equal to CasADi's virtual machine.
+FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
+_TEMPORARY = ".build-"
+_STALE_AFTER = 3600.0  # s; a temporary folder older than this was left by a killed build
+
+
+class CompilationError(Exception):
+    """The C code could not be compiled or stored; the virtual machine takes its place."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler: its path and what it says of itself."""
+
+    path: str
+    version: str
+
+
+@dataclass(frozen=True)
+class Library:
+    """A compiled function: its shared library, its key, and whether it was in the cache."""
+
+    path: Path
+    key: str
+    cache_hit: bool
+
+
+def cache_folder() -> Path:
+    """Return the cache folder: $STATIONKEEP_CACHE, or the user's cache folder."""
+    chosen = os.environ.get("STATIONKEEP_CACHE")
+    return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("stationkeep", False))
+
+
+def find_compiler() -> Compiler | None:
+    """Return the system's C compiler ($CC, cc, gcc or clang), or None."""
+    chosen = os.environ.get("CC")
+    for name in [chosen] if chosen else ["cc", "gcc", "clang"]:
+        path = shutil.which(name)
+        if path:
+            return Compiler(path, _version(path))
+    return None
+
+
+@cache
+def _version(path: str) -> str:
+    answer = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
+    return answer.stdout.partition("\n")[0]
+
+
+def c_source(function: casadi.Function) -> str:
+    """Return the generated C text of a function."""
+    generator = casadi.CodeGenerator(function.name(), {"with_header": False})
+    generator.add(function)
+    return str(generator.dump())
+
+
+def compile_function(function: casadi.Function) -> Library:
+    """Return the compiled library of a function, from the cache or newly built.
+
+    Raises
+    ------
+    CompilationError
+        If there is no compiler, it fails, or the cache folder can't be written.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise CompilationError("no C compiler was found ($CC, cc, gcc, clang)")
+    source = c_source(function)
+    key = _key(source, compiler)
+    entry = cache_folder() / key
+    if _is_whole(entry):
+        return Library(entry / "function.so", key, cache_hit=True)
+    try:
+        _build(source, compiler, entry)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise CompilationError(
+            f"the cache folder '{entry.parent}' can't be used ({reason}; set STATIONKEEP_CACHE to "
+            "another one)"
+        ) from None
+    return Library(entry / "function.so", key, cache_hit=False)
+
+
+def _key(source: str, compiler: Compiler) -> str:
+    parts = (
+        source,
+        compiler.path,
+        compiler.version,
+        *FLAGS,
+        platform.system(),
+        platform.machine(),
+        casadi.CasadiMeta.version(),
+    )
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _is_whole(entry: Path) -> bool:
+    """Return whether an entry's library is the one that its manifest names."""
+    try:
+        manifest = json.loads((entry / "manifest.json").read_text(encoding="utf-8"))
+        return bool(manifest["sha256"] == _digest(entry / "function.so"))
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def _build(source: str, compiler: Compiler, entry: Path) -> None:
+    entry.parent.mkdir(parents=True, exist_ok=True)
+    _remove_stale(entry.parent)
+    folder = entry.parent / f"{_TEMPORARY}{os.getpid()}-{uuid.uuid4().hex}"
+    folder.mkdir()
+    try:
+        code, library = folder / "function.c", folder / "function.so"
+        code.write_text(source, encoding="utf-8")
+        command = [compiler.path, *FLAGS, str(code), "-o", str(library), "-lm"]
+        answer = subprocess.run(command, capture_output=True, text=True, check=False)
+        if answer.returncode != 0 or not library.is_file():
+            fault = (answer.stderr.strip() or "no message").partition("\n")[0]
+            raise CompilationError(f"'{compiler.path}' failed ({fault})")
+        manifest = {"sha256": _digest(library), "compiler": compiler.version, "flags": FLAGS}
+        (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+        _publish(folder, entry)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _publish(folder: Path, entry: Path) -> None:
+    """Rename a finished build to its key, past a broken entry or another process's whole one."""
+    for _ in range(10):
+        try:
+            folder.rename(entry)
+            return
+        except OSError:
+            if _is_whole(entry):
+                return
+            if not entry.exists():
+                raise
+            broken = entry.parent / f"{_TEMPORARY}broken-{uuid.uuid4().hex}"
+            with contextlib.suppress(FileNotFoundError):
+                entry.rename(broken)
+            shutil.rmtree(broken, ignore_errors=True)
+    raise CompilationError(f"the cache entry '{entry}' is broken and can't be replaced; delete it")
+
+
+def _remove_stale(folder: Path) -> None:
+    for left in folder.glob(f"{_TEMPORARY}*"):
+        with contextlib.suppress(OSError):
+            if time.time() - left.stat().st_mtime > _STALE_AFTER:
+                shutil.rmtree(left, ignore_errors=True)

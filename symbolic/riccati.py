@@ -1,0 +1,99 @@
+"""The linearised game: its stabilising Riccati solution and the smallest attenuation level γ*.
+
+    A'P + P A - P B (R^-1 - γ^-2 W_d^-1) B'P + Q = 0,   A - B R_eff^-1 B'P stable
+
+P = X_2 X_1^-1 from the stable eigenspace [X_1; X_2] of the Hamiltonian matrix
+[[A, -B R_eff^-1 B'], [-Q, -A']]; it exists when no eigenvalue lies on the imaginary axis and X_1 is
+invertible, and it is the game's when P is positive semidefinite (Basar and Bernhard 1995, ch. 4).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from .errors import GammaTooSmallError, InputError
+from .game import Game, gamma_threshold
+from .vehicle import Array
+
+
+def stabilising_solution(A: Array, B: Array, Q: Array, R_eff_inverse: Array) -> Array | None:
+    """Return P from the stable eigenspace, shape (n, n), or None where there is none.
+
+    `R_eff_inverse` may be indefinite: nothing is inverted but X_1.
+    """
+    n = A.shape[0]
+    S = B @ R_eff_inverse @ B.T
+    hamiltonian = np.block([[A, -S], [-Q, -A.T]])
+    eigenvalues = scipy.linalg.eigvals(hamiltonian)
+    scale = np.abs(eigenvalues).max()
+    if np.abs(eigenvalues.real).min() <= 1e-10 * scale:
+        return None
+    _, basis, n_stable = scipy.linalg.schur(hamiltonian, sort="lhp")
+    X_1, X_2 = basis[:n, :n], basis[n:, :n]
+    if n_stable != n or np.linalg.cond(X_1) > 1e14:
+        return None
+    P = np.linalg.solve(X_1.T, X_2.T).T
+    P = 0.5 * (P + P.T)
+    if np.linalg.eigvalsh(P).min() < -1e-9 * np.abs(P).max():
+        return None
+    return np.asarray(P, dtype=np.float64)
+
+
+def game_riccati(A: Array, B: Array, game: Game) -> Array:
+    """Return the stabilising solution P of the game Riccati equation, shape (n, n).
+
+    V = ζ'P ζ is the value of the linearised game. The eigenspace solution is polished by one Newton
+    step (a Lyapunov equation), which brings the residual to rounding.
+
+    Raises
+    ------
+    GammaTooSmallError
+        If γ does not exceed γ*.
+    """
+    P = stabilising_solution(A, B, game.Q, game.R_eff_inverse)
+    if P is None:
+        _require_stabilisable(A, B)
+        star = gamma_star(A, B, game.Q, game.R, game.W_d)
+        raise GammaTooSmallError(game.gamma, gamma_threshold(game.R, game.W_d), star)
+    S = B @ game.R_eff_inverse @ B.T
+    closed = A - S @ P
+    polished = scipy.linalg.solve_continuous_lyapunov(closed.T, -(game.Q + P @ S @ P))
+    return np.asarray(0.5 * (polished + polished.T), dtype=np.float64)
+
+
+def gamma_star(A: Array, B: Array, Q: Array, R: Array, W_d: Array, tolerance: float = 1e-9) -> float:
+    """Return γ*, the infimum of γ for which the game Riccati equation is solved, by bisection [-].
+
+    `tolerance` is the relative width of the final bracket.
+    """
+    _require_stabilisable(A, B)
+    R_inverse, W_inverse = np.linalg.inv(R), np.linalg.inv(W_d)
+
+    def solvable(gamma: float) -> bool:
+        P = stabilising_solution(A, B, Q, R_inverse - gamma**-2 * W_inverse)
+        return P is not None
+
+    upper = 2.0 * gamma_threshold(R, W_d)
+    while not solvable(upper):
+        upper *= 2.0
+    lower = 0.0
+    while upper - lower > tolerance * upper:
+        middle = 0.5 * (lower + upper)
+        if solvable(middle):
+            upper = middle
+        else:
+            lower = middle
+    return upper
+
+
+def _require_stabilisable(A: Array, B: Array) -> None:
+    for eigenvalue in np.linalg.eigvals(A):
+        if eigenvalue.real >= -1e-12:
+            pencil = np.hstack([A - eigenvalue * np.eye(A.shape[0]), B])
+            singular = np.linalg.svd(pencil, compute_uv=False)
+            if singular[-1] < 1e-10 * singular[0]:
+                raise InputError(
+                    f"the linearised plant can't be stabilised: its mode at {eigenvalue:.4g} 1/s is "
+                    "not reached by any input"
+                )
