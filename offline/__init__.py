@@ -1,0 +1,19 @@
+"""Offline optimum: collocation, IPOPT, and the checks that don't trust its status."""
+
+from .direct import DirectSolution, DirectSolver
+from .plant import Plant
+from .settings import OfflineSettings
+from .solve import Certificate, OfflineSolution, OfflineSolver, solve
+from .trajectory import Trajectory
+
+__all__ = [
+    "Certificate",
+    "DirectSolution",
+    "DirectSolver",
+    "OfflineSettings",
+    "OfflineSolution",
+    "OfflineSolver",
+    "Plant",
+    "Trajectory",
+    "solve",
+]

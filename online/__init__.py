@@ -1,0 +1,34 @@
+"""Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
+
+from .closed_loop import History, Policy, run
+from .controller import Controller
+from .disturbance import build_disturbance
+from .learner import Learner, LearnerStep
+from .record import load, load_weights, save, to_dataset
+from .samples import draw_samples, rank_margin
+from .settings import (
+    DisturbanceSettings,
+    LearnerSettings,
+    SampleSettings,
+    SimulationSettings,
+)
+
+__all__ = [
+    "Controller",
+    "DisturbanceSettings",
+    "History",
+    "Learner",
+    "LearnerSettings",
+    "LearnerStep",
+    "Policy",
+    "SampleSettings",
+    "SimulationSettings",
+    "build_disturbance",
+    "draw_samples",
+    "load",
+    "load_weights",
+    "rank_margin",
+    "run",
+    "save",
+    "to_dataset",
+]

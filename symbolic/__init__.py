@@ -7,6 +7,7 @@ from .kernel import Export, Kernel
 from .model import Model, require_state
 from .problem import Problem, closed_form_problem
 from .riccati import game_riccati, gamma_star
+from .station import StationKeeping
 from .value import PointTerms, ValueFunctions
 from .vehicle import Thrusters, Vehicle
 
@@ -21,6 +22,7 @@ __all__ = [
     "PointTerms",
     "Problem",
     "RunError",
+    "StationKeeping",
     "StationkeepError",
     "Thrusters",
     "ValueFunctions",

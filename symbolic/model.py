@@ -44,7 +44,7 @@ class Model:
         self.vehicle = vehicle
         self.current = current
         self.zeta = SX.sym("zeta", 12)
-        self._compiled = compiled
+        self.compiled = compiled
         self._exports: dict[str, Export] = {}
 
     def drift(self, zeta: ArrayLike) -> Array:
@@ -164,7 +164,7 @@ class Model:
         return self._export("input_matrix", {"zeta": self.zeta}, {"g": g})
 
     def _export(self, name: str, inputs: dict[str, SX], outputs: dict[str, SX]) -> Kernel:
-        kernel, described = export(dense_function(name, inputs, outputs), compiled=self._compiled)
+        kernel, described = export(dense_function(name, inputs, outputs), compiled=self.compiled)
         self._exports[name] = described
         return kernel
 

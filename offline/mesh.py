@@ -1,0 +1,37 @@
+"""Meshes of the time axis: graded towards t = 0, where an optimal trajectory moves fastest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..symbolic.vehicle import Array
+
+
+def graded_mesh(horizon: float, n_intervals: int, grading: float) -> Array:
+    """Return mesh points t_i = T (e^{a i/K} - 1) / (e^a - 1), shape (K + 1,) [s].
+
+    `grading` a is the logarithm of the ratio of the last to the first interval; 0 is uniform.
+    """
+    s = np.linspace(0.0, 1.0, n_intervals + 1)
+    if grading == 0.0:
+        return horizon * s
+    return np.asarray(horizon * np.expm1(grading * s) / np.expm1(grading))
+
+
+def aligned_mesh(mesh: Array, events: Array, *, closest: float = 0.2) -> Array:
+    """Return the mesh with a point at every event, sorted.
+
+    A mesh point nearer to an event than `closest` times the shorter of its intervals moves onto it;
+    other events split their interval.
+    """
+    points = list(mesh)
+    for event in np.sort(events):
+        i = int(np.argmin(np.abs(np.array(points) - event)))
+        neighbours = [abs(points[j] - points[i]) for j in (i - 1, i + 1) if 0 <= j < len(points)]
+        inner = 0 < i < len(points) - 1
+        if inner and abs(points[i] - event) < closest * min(neighbours):
+            points[i] = float(event)
+        elif points[0] < event < points[-1]:
+            points.append(float(event))
+            points.sort()
+    return np.array(points)

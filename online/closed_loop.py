@@ -1,0 +1,175 @@
+"""One closed-loop run: controller, plant and disturbance, recorded until its end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from ..symbolic import InputError, RunError, StationKeeping
+from ..symbolic.vehicle import Array
+from .controller import Controller, ControllerScenario
+from .disturbance import build_disturbance
+from .plant import HeldPlant, PlantState
+from .settings import SimulationSettings
+
+Progress = Callable[[float], None]
+
+
+class RunScenario(ControllerScenario, Protocol):
+    """What a run needs of a scenario."""
+
+    @property
+    def simulation(self) -> SimulationSettings:
+        """Settings of the run."""
+        ...
+
+
+class Policy(Protocol):
+    """What drives the vehicle: a controller, or a baseline with the same steps."""
+
+    u_disturbance: Array
+
+    def step(self, eta: Array, eta_dot: Array, dt: float) -> Array:
+        """Return the body wrench to hold for dt, shape (6,)."""
+        ...
+
+    def body_wrench(self, u: Array) -> Array:
+        """Return J'u at the last state, shape (6,)."""
+        ...
+
+
+@dataclass
+class History:
+    """Lists that grow with the run; `record.to_dataset` names and stacks them."""
+
+    time: list[float] = field(default_factory=list)
+    zeta: list[Array] = field(default_factory=list)
+    tau_b: list[Array] = field(default_factory=list)
+    u_control: list[Array] = field(default_factory=list)
+    disturbance: list[Array] = field(default_factory=list)
+    cost: list[float] = field(default_factory=list)
+    attenuated: list[float] = field(default_factory=list)
+    learn_time: list[float] = field(default_factory=list)
+    bellman_error: list[float] = field(default_factory=list)
+    sample_error: list[float] = field(default_factory=list)
+    rank_margin: list[float] = field(default_factory=list)
+    projecting: list[bool] = field(default_factory=list)
+    critic: list[Array] = field(default_factory=list)
+    actor_1: list[Array] = field(default_factory=list)
+    actor_2: list[Array] = field(default_factory=list)
+    stopped: str | None = None
+    wall_seconds: float = 0.0
+
+
+def run(
+    scenario: RunScenario, policy: Policy | None = None, progress: Progress | None = None
+) -> History:
+    """Run a scenario in closed loop, with its own controller unless a policy is given.
+
+    Ends early, keeping what was recorded and naming the reason, when the pitch leaves its band, the
+    state leaves χ, anything is not finite, or the user interrupts.
+
+    Parameters
+    ----------
+    progress : called with the simulated time [s] after every control period
+    """
+    loop = _Loop(scenario, Controller(scenario) if policy is None else policy)
+    started = time.perf_counter()
+    try:
+        loop.go(progress)
+    except KeyboardInterrupt:
+        loop.history.stopped = f"interrupted at t = {loop.t:.2f} s"
+    loop.history.wall_seconds = time.perf_counter() - started
+    return loop.history
+
+
+class _Loop:
+    def __init__(self, scenario: RunScenario, policy: Policy) -> None:
+        self.settings = scenario.simulation
+        self.station: StationKeeping = scenario.station_keeping()
+        self.policy = policy
+        source = build_disturbance(self.settings.disturbance)
+        self.plant = HeldPlant(self.station, source, self.settings.tolerance)
+        self.history = History()
+        self.state = PlantState(np.array(self.settings.initial_state), 0.0, 0.0)
+        self.t = 0.0
+        self._learned = 0
+
+    def go(self, progress: Progress | None) -> None:
+        period = self.settings.control_period
+        n_steps = round(self.settings.duration / period)
+        tau_b, tau_d = np.zeros(6), np.zeros(6)
+        for i in range(n_steps + 1):
+            self.t = i * period
+            reason = self._out_of_bounds()
+            if reason:
+                self.history.stopped = f"{reason} at t = {self.t:.2f} s"
+                return
+            try:
+                tau_b = self.policy.step(self.state.zeta[:6], self.state.zeta[6:], period)
+            except (InputError, RunError, np.linalg.LinAlgError) as error:
+                self.history.stopped = f"the controller failed at t = {self.t:.2f} s: {error}"
+                return
+            if self.settings.mode == "game":
+                tau_d = self.policy.body_wrench(self.policy.u_disturbance)
+            self._record(tau_b, tau_d)
+            if i == n_steps:
+                return
+            try:
+                self.state = self.plant.advance(self.t, self.state, tau_b, tau_d, period)
+            except RunError as error:
+                self.history.stopped = str(error)
+                return
+            if progress is not None:
+                progress(self.t + period)
+
+    def _out_of_bounds(self) -> str | None:
+        zeta, settings = self.state.zeta, self.settings
+        if not np.all(np.isfinite(zeta)):
+            return "the state is not finite"
+        pitch = np.degrees(zeta[4])
+        if abs(pitch) > settings.pitch_limit:
+            return f"the pitch left ±{settings.pitch_limit:g} deg ({pitch:.1f} deg)"
+        far = np.abs(zeta) / self.station.half_widths
+        if far.max() > settings.chi:
+            name = STATE_NAMES[int(far.argmax())]
+            return f"the state left chi ({name} is {far.max():.2f} half-widths, over {settings.chi:g})"
+        return None
+
+    def _record(self, tau_b: Array, tau_d: Array) -> None:
+        history, state = self.history, self.state
+        _, u_control, disturbance = self.plant.rates(self.t, state.zeta, tau_b, tau_d)
+        history.time.append(self.t)
+        history.zeta.append(state.zeta)
+        history.tau_b.append(tau_b)
+        history.u_control.append(u_control)
+        history.disturbance.append(disturbance)
+        history.cost.append(state.cost)
+        history.attenuated.append(state.attenuated)
+        if isinstance(self.policy, Controller):
+            self._record_learner(self.policy)
+
+    def _record_learner(self, controller: Controller) -> None:
+        step, learner, history = controller.last_step, controller.learner, self.history
+        if step is None:
+            return
+        monitored = self._learned % self.settings.monitor_every == 0
+        self._learned += 1
+        history.learn_time.append(self.t)
+        history.bellman_error.append(step.bellman_error)
+        history.sample_error.append(step.sample_error)
+        history.projecting.append(step.projecting)
+        history.rank_margin.append(learner.rank_margin() if monitored else np.nan)
+        history.critic.append(learner.critic)
+        history.actor_1.append(learner.actor_1)
+        history.actor_2.append(learner.actor_2)
+
+
+STATE_NAMES = (
+    *("x", "y", "z", "phi", "theta", "psi"),
+    *("x_dot", "y_dot", "z_dot", "phi_dot", "theta_dot", "psi_dot"),
+)

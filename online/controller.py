@@ -1,0 +1,146 @@
+"""The controller a user steps in a loop of their own."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..symbolic import InputError, StationKeeping, require_state
+from ..symbolic.vehicle import Array
+from .learner import Learner, LearnerStep
+from .samples import draw_samples
+from .settings import LearnerSettings, SampleSettings
+
+
+class ControllerScenario(Protocol):
+    """What a controller needs of a scenario."""
+
+    @property
+    def learner(self) -> LearnerSettings:
+        """Settings of the actor-critic."""
+        ...
+
+    @property
+    def samples(self) -> SampleSettings:
+        """Settings of the sample points."""
+        ...
+
+    def station_keeping(self) -> StationKeeping:
+        """Return vehicle, game and basis."""
+        ...
+
+    def initial_weights(self) -> Array | None:
+        """Return the weights to start from, or None for the Riccati solution."""
+        ...
+
+
+class Controller:
+    """Hold a vehicle at a station and learn to do it better.
+
+    Parameters
+    ----------
+    scenario : vehicle, game, basis, learner and samples
+    station : x, y, z [m] and heading ψ [rad] to hold, in the earth frame
+    learn : False keeps the initial weights (with the default ones, the linear H-infinity policy
+        -R^-1 g(ζ)'P ζ)
+
+    Attributes
+    ----------
+    learner : the actor-critic
+    zeta : (12,) the last state: pose error and rates in the station's frame
+    u_control, u_disturbance : (6,) û_1 and û_2 there [N, N m]
+    last_step : what the last learning step saw
+
+    Examples
+    --------
+    >>> controller = Controller(Scenario.load("bluerov2-heavy"), station=(0, 0, 5, 0))
+    >>> tau_b = controller.step(eta, eta_dot, dt=0.02)
+    """
+
+    def __init__(
+        self,
+        scenario: ControllerScenario,
+        station: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+        *,
+        learn: bool = True,
+    ) -> None:
+        if len(station) != 4 or not np.all(np.isfinite(station)):
+            raise InputError(f"the station is {station}, but must be four finite numbers x, y, z, psi")
+        self.setup = scenario.station_keeping()
+        self.station = np.array(station, dtype=float)
+        if station[3] != 0.0 and any(self.setup.model.current):
+            raise InputError(
+                "a known current can't be combined with a station heading other than 0; turn the "
+                "earth frame so that its x axis is the heading to hold, and the current with it"
+            )
+        self.learn = learn
+        samples = scenario.samples
+        points = draw_samples(
+            self.setup.envelope, samples.number if learn else 0, samples.seed, inner=samples.inner
+        )
+        self.learner = Learner(
+            self.setup.problem,
+            self.setup.basis,
+            scenario.learner,
+            points,
+            self.setup.riccati_weights,
+            scenario.initial_weights(),
+            self.setup.functions,
+        )
+        self.period = scenario.learner.period
+        self._since = 0.0
+        self.last_step: LearnerStep | None = None
+        self.zeta = np.zeros(12)
+        self.u_control = np.zeros(6)
+        self.u_disturbance = np.zeros(6)
+
+    def step(self, eta: ArrayLike, eta_dot: ArrayLike, dt: float) -> Array:
+        """Return the body wrench τ_b = J'(û_1 + u_trim) to hold for the next dt, shape (6,) [N, N m].
+
+        Learns once `period` has passed since it last did.
+
+        Parameters
+        ----------
+        eta : (6,) measured pose in the earth frame [m, rad]
+        eta_dot : (6,) its rate [m/s, rad/s]
+        dt : time since the last call, which is also how long τ_b is held [s]
+
+        Raises
+        ------
+        InputError
+            If the measurement is not finite or of the wrong shape, or |pitch| >= 90 degrees.
+        """
+        pose, rate = np.asarray(eta, dtype=float), np.asarray(eta_dot, dtype=float)
+        if not dt > 0.0:
+            raise InputError(f"dt is {dt}, but must be a positive time in seconds")
+        if pose.shape != (6,) or rate.shape != (6,):
+            raise InputError(
+                f"eta and eta_dot must have 6 entries each, but have {pose.shape} and {rate.shape}"
+            )
+        self.zeta = require_state(self._error(pose, rate))
+        self.last_step = None
+        self._since += dt
+        if self.learn and self._since >= self.period * (1.0 - 1e-9):
+            self.last_step = self.learner.step(self.zeta, self._since)
+            self._since = 0.0
+        self.u_control, self.u_disturbance = self.learner.policies(self.zeta)
+        return self.body_wrench(self.u_control + self.setup.model.u_trim)
+
+    def body_wrench(self, u: Array) -> Array:
+        """Return τ = J(η)'u of an earth-frame force u at the last state, shape (6,)."""
+        (J,) = self.setup.model.kinematics(self.zeta[:6])
+        return np.asarray(J.T @ u)
+
+    def _error(self, eta: Array, eta_dot: Array) -> Array:
+        """Return the state relative to the station, in a frame turned by the station's heading.
+
+        The dynamics don't depend on where north is, so the learned policy holds at every heading.
+        """
+        heading = self.station[3]
+        c, s = np.cos(heading), np.sin(heading)
+        turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        yaw = np.arctan2(np.sin(eta[5] - heading), np.cos(eta[5] - heading))
+        position = turn @ (eta[:3] - self.station[:3])
+        return np.concatenate([position, eta[3:5], [yaw], turn @ eta_dot[:3], eta_dot[3:]])

@@ -1,0 +1,140 @@
+"""Settings of the learner, its samples and the closed loop; the TOML groups of a scenario."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
+
+from ..symbolic.settings import Settings
+from .critic import Normalizer
+
+Six = tuple[float, float, float, float, float, float]
+Three = tuple[float, float, float]
+ZERO_SIX: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class LearnerSettings(Settings):
+    """Actor-critic of (17)-(21).
+
+    Attributes
+    ----------
+    rule : `gradient` is (19); `least_squares` is recursive, with forgetting
+    normalizer : weight of a row; `paper` is 1/p as printed, see `critic.row_weights`
+    gain_critic : η_c of the row at the state [1/s]
+    gain_samples : η_c of the sample rows [1/s]; as gain_critic when not given
+    average_samples : divide the sum over the samples by N
+    gain_actor_1, gain_actor_2 : η_a1, η_a2 of (20)(21) [1/s]
+    forgetting : β of least squares [1/s]
+    covariance, covariance_bound : Γ(0) and Γ_max as multiples of the identity
+    leash : strength of the ridge towards the Riccati weights, relative to what the samples know of
+        each weight at the start; 0 is none
+    period : time between learning steps [s]
+    weights : start from the Riccati solution (`riccati`) or from the record of a run (its path)
+    weight_factor : multiple of those weights to start from
+    weight_bound : projection bound as a multiple of the norm of the Riccati weights
+    """
+
+    rule: Literal["gradient", "least_squares"] = "least_squares"
+    normalizer: Normalizer = "paper"
+    gain_critic: NonNegativeFloat = 1.0
+    gain_samples: NonNegativeFloat | None = None
+    average_samples: bool = False
+    gain_actor_1: PositiveFloat = 2.0
+    gain_actor_2: PositiveFloat = 2.0
+    forgetting: NonNegativeFloat = 2.0
+    covariance: PositiveFloat = 1e6
+    covariance_bound: PositiveFloat = 1e8
+    leash: NonNegativeFloat = 0.0
+    period: PositiveFloat = 0.25
+    weights: str = "riccati"
+    weight_factor: float = 1.0
+    weight_bound: Annotated[float, Field(gt=1.0)] = 3.0
+
+    @model_validator(mode="after")
+    def _consistent(self) -> LearnerSettings:
+        if self.covariance > self.covariance_bound:
+            raise ValueError(
+                f"covariance is {self.covariance:g}, but must not exceed covariance_bound = "
+                f"{self.covariance_bound:g}; raise the bound"
+            )
+        if self.forgetting * self.period > 1.0:
+            raise ValueError(
+                f"forgetting * period is {self.forgetting * self.period:g}, but must be at most 1 for "
+                "the covariance to stay bounded; learn more often or forget more slowly"
+            )
+        return self
+
+
+class SampleSettings(Settings):
+    """Sample points ζ_j of (18): `number` of them, drawn in the envelope with `seed`.
+
+    `inner`: points are shrunk by a factor uniform on (inner, 1), so that some lie near the origin.
+    """
+
+    number: NonNegativeInt = 600
+    seed: NonNegativeInt = 1
+    inner: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
+
+
+class DisturbanceSettings(Settings):
+    """A disturbance d(t), unknown to the controller.
+
+    Attributes
+    ----------
+    kind : `none`, `constant` or `sinusoid` force, `current` step, `waves` (JONSWAP)
+    force : earth-frame force and moment, or its amplitude [N, N m]
+    frequency : of the sinusoid [Hz]
+    velocity : earth-frame water velocity of the current [m/s]
+    start : time of the step [s]
+    wave_height : significant wave height H_s [m]
+    wave_period : peak period T_p [s]
+    wave_heading : direction of travel from the earth x axis [deg]
+    depth : of the station below the surface [m]
+    peak_enhancement : JONSWAP γ [-]
+    seed : of the wave phases
+    """
+
+    kind: Literal["none", "constant", "sinusoid", "current", "waves"] = "none"
+    force: Six = ZERO_SIX
+    frequency: PositiveFloat = 0.1
+    velocity: Three = (0.0, 0.0, 0.0)
+    start: NonNegativeFloat = 0.0
+    wave_height: PositiveFloat = 0.25
+    wave_period: PositiveFloat = 4.0
+    wave_heading: float = 0.0
+    depth: PositiveFloat = 3.0
+    peak_enhancement: Annotated[float, Field(ge=1.0)] = 3.3
+    seed: NonNegativeInt = 1
+
+
+class SimulationSettings(Settings):
+    """One closed-loop run.
+
+    Attributes
+    ----------
+    initial_state : (12,) x, y, z, φ, θ, ψ and their rates [m, rad, m/s, rad/s]
+    duration : [s]
+    mode : `game` drives the plant with û_1 + û_2, as the proof does; `disturbed` with û_1 and d(t)
+    control_period : zero-order hold of the controller [s]
+    tolerance : relative tolerance of the plant's integration
+    pitch_limit : the run ends when |pitch| exceeds it [deg]
+    chi : the run ends when a state exceeds this multiple of the full envelope's half-width
+    """
+
+    initial_state: tuple[float, ...] = Field(min_length=12, max_length=12)
+    duration: PositiveFloat = 60.0
+    mode: Literal["game", "disturbed"] = "game"
+    control_period: PositiveFloat = 0.02
+    tolerance: Annotated[float, Field(gt=0.0, lt=1e-2)] = 1e-8
+    pitch_limit: Annotated[float, Field(gt=0.0, lt=90.0)] = 75.0
+    chi: PositiveFloat = 2.0
+    monitor_every: PositiveInt = 4
+    disturbance: DisturbanceSettings = DisturbanceSettings()

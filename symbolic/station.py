@@ -1,0 +1,48 @@
+"""The station-keeping game of one vehicle, with everything that learner and solvers share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from .basis import Basis
+from .game import Game
+from .model import Model
+from .problem import Problem
+from .value import ValueFunctions
+from .vehicle import Array
+
+
+@dataclass(frozen=True, eq=False)
+class StationKeeping:
+    """A vehicle, a game and a basis, compiled when first used.
+
+    Attributes
+    ----------
+    model : the vehicle's dynamics
+    problem : the game on its plant
+    basis : of the value function
+    half_widths : (12,) of the full envelope [m, rad, m/s, rad/s], the unit of the scaled state
+    envelope : (12,) half-widths of the part in which policies are learned and compared
+    """
+
+    model: Model
+    problem: Problem
+    basis: Basis
+    half_widths: Array
+    envelope: Array
+
+    @property
+    def game(self) -> Game:
+        """The weights of the game."""
+        return self.problem.game
+
+    @cached_property
+    def functions(self) -> ValueFunctions:
+        """Compiled basis, sample kernel and policies."""
+        return ValueFunctions(self.problem, self.basis, compiled=self.model.compiled)
+
+    @cached_property
+    def riccati_weights(self) -> Array:
+        """Weights with W'σ(ζ) = ζ'P ζ, shape (m,): the linear H-infinity policy."""
+        return self.basis.quadratic_weights(self.problem.P)
