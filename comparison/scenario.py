@@ -1,0 +1,227 @@
+"""A scenario: the one input of the online run and of the offline optimum."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import Field, PositiveFloat, PrivateAttr, model_validator
+
+from ..offline import OfflineSettings
+from ..online import LearnerSettings, SampleSettings, SimulationSettings, load_weights
+from ..symbolic import (
+    Basis,
+    Game,
+    GammaTooSmallError,
+    InputError,
+    Model,
+    Problem,
+    StationKeeping,
+    Vehicle,
+    find_function,
+    require_state,
+)
+from ..symbolic.riccati import gamma_star
+from ..symbolic.settings import Settings, locate, read_toml, shipped_names, validate
+from ..symbolic.vehicle import Array, Vector3
+
+Weight = list[float] | list[list[float]]
+DEFAULT = "bluerov2-heavy"
+
+
+class GameSettings(Settings):
+    """Weights of (5); a list is a diagonal.
+
+    Attributes
+    ----------
+    Q : 12 or 12x12; R : 6 or 6x6
+    W_d : 6 or 6x6, or the word "R" for W_d = R; the paper's is the identity
+    gamma : attenuation level [-]
+    """
+
+    Q: Weight
+    R: Weight
+    W_d: Weight | str = Field(default_factory=lambda: [1.0] * 6)
+    gamma: PositiveFloat
+
+    @model_validator(mode="after")
+    def _word(self) -> GameSettings:
+        if isinstance(self.W_d, str) and self.W_d != "R":
+            raise ValueError(
+                f"W_d is '{self.W_d}', but must be a matrix, a diagonal, or the word \"R\""
+            )
+        return self
+
+
+class EnvelopeSettings(Settings):
+    """Where the vehicle is expected: half-widths of the states [m, rad, m/s, rad/s].
+
+    `scale` is the part of it in which samples are drawn and policies compared.
+    """
+
+    half_widths: tuple[float, ...] = Field(min_length=12, max_length=12)
+    scale: PositiveFloat = 1.0
+
+    @model_validator(mode="after")
+    def _positive(self) -> EnvelopeSettings:
+        if min(self.half_widths) <= 0.0:
+            raise ValueError(f"half_widths must be positive, but one is {min(self.half_widths)}")
+        return self
+
+
+class BasisSettings(Settings):
+    """The basis: `quadratic`, `drag`, `drag-cubic`, or a user's as "file.py:function"."""
+
+    name: str = "drag"
+
+
+class Scenario(Settings):
+    """Vehicle, game, envelope, basis, learner, samples, simulation and offline solve.
+
+    Attributes
+    ----------
+    vehicle : a shipped name or the path of a TOML file
+    current : known steady current in the earth frame [m/s], balanced by the trim
+    """
+
+    vehicle: str
+    current: Vector3 = (0.0, 0.0, 0.0)
+    game: GameSettings
+    envelope: EnvelopeSettings
+    basis: BasisSettings = BasisSettings()
+    learner: LearnerSettings = LearnerSettings()
+    samples: SampleSettings = SampleSettings()
+    simulation: SimulationSettings
+    offline: OfflineSettings = OfflineSettings()
+
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @classmethod
+    def load(cls, name: str | Path = DEFAULT, overrides: Sequence[str] = ()) -> Scenario:
+        """Load a shipped scenario by name, or a user's by the path of its TOML file.
+
+        Parameters
+        ----------
+        overrides : "section.key=value" settings, values written as in TOML
+
+        Raises
+        ------
+        InputError
+            If there is no such scenario or it breaks a rule; one sentence says which.
+        """
+        path = locate(name, __package__, "scenarios", "scenario")
+        data = read_toml(path)
+        for override in overrides:
+            _override(data, override)
+        scenario = validate(cls, data, f"scenario '{name}'")
+        scenario._folder = path.parent
+        require_state(scenario.simulation.initial_state)
+        return scenario
+
+    @staticmethod
+    def shipped() -> list[str]:
+        """Return the names of the shipped scenarios."""
+        return shipped_names(str(__package__), "scenarios")
+
+    def with_settings(self, **groups: dict[str, Any]) -> Scenario:
+        """Return a copy with keys of some groups replaced: `with_settings(samples={"number": 0})`.
+
+        What doesn't depend on the changed groups is compiled once for both.
+        """
+        data = self.model_dump()
+        for group, keys in groups.items():
+            data[group] |= keys
+        changed = validate(Scenario, data, "scenario")
+        changed._folder = self._folder
+        if not {"game", "envelope", "basis"} & set(groups):
+            changed.__dict__["_station_keeping"] = self._station_keeping
+        return changed
+
+    def station_keeping(self) -> StationKeeping:
+        """Return vehicle, game and basis, compiled when first used; built once a scenario.
+
+        Raises
+        ------
+        InputError
+            If the vehicle, the game or the basis breaks a rule; γ too small names γ*.
+        """
+        return self._station_keeping
+
+    def initial_weights(self) -> Array | None:
+        """Return the learner's initial weights, or None for the Riccati solution.
+
+        Raises
+        ------
+        InputError
+            If the file of weights is not a record with as many weights as the basis.
+        """
+        learner = self.learner
+        if learner.weights == "riccati":
+            return None
+        path = self._path(learner.weights)
+        weights = load_weights(path) * learner.weight_factor
+        n_basis = self._station_keeping.basis.n_basis
+        if weights.shape != (n_basis,):
+            raise InputError(
+                f"'{path}' holds {weights.size} weights, but basis '{self.basis.name}' has {n_basis}; "
+                "use the record of a run with the same basis"
+            )
+        return weights
+
+    @property
+    def initial_state(self) -> Array:
+        """ζ(0), shape (12,)."""
+        return np.array(self.simulation.initial_state)
+
+    @cached_property
+    def _station_keeping(self) -> StationKeeping:
+        model = Model(self._vehicle(), self.current)
+        half_widths = np.array(self.envelope.half_widths)
+        problem = self._problem(model, half_widths)
+        _ = problem.P  # refuses a gamma without stabilising solution
+        name, separator, function = self.basis.name.rpartition(":")
+        located = f"{self._path(name)}:{function}" if separator else self.basis.name
+        basis = Basis.build(self.basis.name, find_function(located), problem.zeta, half_widths)
+        return StationKeeping(model, problem, basis, half_widths, self.envelope.scale * half_widths)
+
+    def _vehicle(self) -> Vehicle:
+        named = "/" not in self.vehicle and not self.vehicle.endswith(".toml")
+        return Vehicle.load(self.vehicle if named else self._path(self.vehicle))
+
+    def _problem(self, model: Model, half_widths: Array) -> Problem:
+        settings = self.game
+        W_d = settings.R if isinstance(settings.W_d, str) else settings.W_d
+        huge = Game(np.array(settings.Q), np.array(settings.R), np.array(W_d), np.inf)
+        problem = model.problem(huge, half_widths)
+        try:
+            return problem.with_game(Game(huge.Q, huge.R, huge.W_d, settings.gamma))
+        except GammaTooSmallError as error:
+            star = gamma_star(*problem.linearization, huge.Q, huge.R, huge.W_d)
+            raise GammaTooSmallError(settings.gamma, error.threshold, star) from None
+
+    def _path(self, text: str) -> Path:
+        """Resolve a path in the scenario: absolute, or relative to the working or its own folder."""
+        path = Path(text).expanduser()
+        if not path.is_absolute() and not path.exists() and self._folder is not None:
+            return self._folder / path
+        return path
+
+
+def _override(data: dict[str, Any], text: str) -> None:
+    key, separator, value = text.partition("=")
+    if not separator or not key.strip():
+        raise InputError(f"--set {text}: write section.key=value, for instance game.gamma=3")
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        parsed = value.strip()
+    *groups, last = key.strip().split(".")
+    for group in groups:
+        data = data.setdefault(group, {})
+        if not isinstance(data, dict):
+            raise InputError(f"--set {text}: '{group}' is a value, not a group of settings")
+    data[last] = parsed
