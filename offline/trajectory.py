@@ -34,6 +34,22 @@ class Trajectory:
         """Return u_1* and u_2* at the collocation points, each (K d, k)."""
         return game.players(self.v)
 
+    def quadrature(self, values: Array) -> Array:
+        """Integrate values at the collocation points up to each of `times`, shape (K d + 1,).
+
+        By the collocation polynomial on each interval, which at its end is the Radau quadrature.
+        """
+        d = self.degree
+        nodes = (self.times[1 : d + 1] - self.mesh[0]) / (self.mesh[1] - self.mesh[0])
+        powers = np.arange(d)
+        # integrals from 0 to each node of the polynomial through the nodes
+        weights = (nodes[:, None] ** (powers + 1) / (powers + 1)) @ np.linalg.inv(
+            nodes[:, None] ** powers
+        )
+        pieces = np.diff(self.mesh)[:, None] * (values.reshape(-1, d) @ weights.T)
+        starts = np.concatenate([[0.0], np.cumsum(pieces[:-1, -1])])
+        return np.append(0.0, (starts[:, None] + pieces).ravel())
+
     def at_mesh(self) -> Array:
         """Return the states at the mesh points, shape (K + 1, n)."""
         return self.states[:: self.degree]

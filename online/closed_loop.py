@@ -13,6 +13,7 @@ from ..symbolic import InputError, RunError, StationKeeping
 from ..symbolic.vehicle import Array
 from .controller import Controller, ControllerScenario
 from .disturbance import build_disturbance
+from .learner import Learner, LearnerStep
 from .plant import HeldPlant, PlantState
 from .settings import SimulationSettings
 
@@ -83,6 +84,7 @@ def run(
         loop.go(progress)
     except KeyboardInterrupt:
         loop.history.stopped = f"interrupted at t = {loop.t:.2f} s"
+    loop.finish()
     loop.history.wall_seconds = time.perf_counter() - started
     return loop.history
 
@@ -97,7 +99,6 @@ class _Loop:
         self.history = History()
         self.state = PlantState(np.array(self.settings.initial_state), 0.0, 0.0)
         self.t = 0.0
-        self._learned = 0
 
     def go(self, progress: Progress | None) -> None:
         period = self.settings.control_period
@@ -150,23 +151,26 @@ class _Loop:
         history.disturbance.append(disturbance)
         history.cost.append(state.cost)
         history.attenuated.append(state.attenuated)
-        if isinstance(self.policy, Controller):
-            self._record_learner(self.policy)
+        if isinstance(self.policy, Controller) and self.policy.last_step is not None:
+            self._record_learner(self.policy.last_step, self.policy.learner)
 
-    def _record_learner(self, controller: Controller) -> None:
-        step, learner, history = controller.last_step, controller.learner, self.history
-        if step is None:
-            return
-        monitored = self._learned % self.settings.monitor_every == 0
-        self._learned += 1
+    def _record_learner(self, seen: LearnerStep, learner: Learner, *, last: bool = False) -> None:
+        history = self.history
+        monitored = last or len(history.learn_time) % self.settings.monitor_every == 0
         history.learn_time.append(self.t)
-        history.bellman_error.append(step.bellman_error)
-        history.sample_error.append(step.sample_error)
-        history.projecting.append(step.projecting)
+        history.bellman_error.append(seen.bellman_error)
+        history.sample_error.append(seen.sample_error)
+        history.projecting.append(seen.projecting)
         history.rank_margin.append(learner.rank_margin() if monitored else np.nan)
-        history.critic.append(learner.critic)
-        history.actor_1.append(learner.actor_1)
-        history.actor_2.append(learner.actor_2)
+        history.critic.append(seen.critic)
+        history.actor_1.append(seen.actor_1)
+        history.actor_2.append(seen.actor_2)
+
+    def finish(self) -> None:
+        """Record the weights that the run ended with."""
+        if isinstance(self.policy, Controller) and self.policy.learn:
+            learner = self.policy.learner
+            self._record_learner(learner.observe(self.policy.zeta), learner, last=True)
 
 
 STATE_NAMES = (

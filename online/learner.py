@@ -17,15 +17,19 @@ from .settings import LearnerSettings
 
 @dataclass(frozen=True)
 class LearnerStep:
-    """What one learning step saw, before it moved the weights.
+    """What the learner saw at a state, and the weights under which it saw it.
 
     Attributes
     ----------
+    critic, actor_1, actor_2 : (m,) weights, before a step moves them
     bellman_error : δ at the state (17), in units of cost per second
     sample_error : rms over the samples of δ_j / (ζ_j'Qζ_j); NaN without samples
-    projecting : whether the smooth projection acted on an actor
+    projecting : whether the smooth projection acts on an actor
     """
 
+    critic: Array
+    actor_1: Array
+    actor_2: Array
     bellman_error: float
     sample_error: float
     projecting: bool
@@ -84,20 +88,19 @@ class Learner:
 
     def step(self, zeta: Array, dt: float) -> LearnerStep:
         """Learn for dt from the state ζ (n,) and the samples; move critic, then actors."""
-        terms = self._terms(zeta[None, :])
-        here = self._residual(terms)
-        omega, delta = here.omega, here.delta
-        weights = self.settings.gain_critic * self._row_weights(omega, terms.state_cost)
-        sample_error = np.nan
-        if self._samples is not None:
-            there = self._residual(self._samples)
-            omega, delta = np.vstack([omega, there.omega]), np.append(delta, there.delta)
-            weights = np.append(weights, self._sample_weights(there.omega))
-            sample_error = float(np.sqrt(np.mean((there.delta / self._samples.state_cost) ** 2)))
-        rows = NormalEquations.of(omega, delta, weights, self._leash, self.critic - self.reference)
-        self._move(rows, dt)
-        projecting = self.projection.active(self.actor_1) or self.projection.active(self.actor_2)
-        return LearnerStep(float(here.delta[0]), sample_error, projecting)
+        seen, rows = self._observe(zeta)
+        if self.settings.rule == "gradient":
+            self.critic = gradient_step(self.critic, rows, dt)
+        else:
+            self.critic = self._least_squares.step(self.critic, rows, dt)
+        gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
+        self.actor_1 = actor_step(self.actor_1, self.critic, gains[0], dt, self.projection)
+        self.actor_2 = actor_step(self.actor_2, self.critic, gains[1], dt, self.projection)
+        return seen
+
+    def observe(self, zeta: Array) -> LearnerStep:
+        """Return what a step at ζ (n,) would see, without moving the weights."""
+        return self._observe(zeta)[0]
 
     def policies(self, zeta: Array) -> tuple[Array, Array]:
         """Return û_1 (14) and û_2 (15) at ζ, each (k,)."""
@@ -117,14 +120,28 @@ class Learner:
         residual = self.sample_residual()
         return 0.0 if residual is None else rank_margin(residual.omega)
 
-    def _move(self, rows: NormalEquations, dt: float) -> None:
-        if self.settings.rule == "gradient":
-            self.critic = gradient_step(self.critic, rows, dt)
-        else:
-            self.critic = self._least_squares.step(self.critic, rows, dt)
-        gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
-        self.actor_1 = actor_step(self.actor_1, self.critic, gains[0], dt, self.projection)
-        self.actor_2 = actor_step(self.actor_2, self.critic, gains[1], dt, self.projection)
+    def _observe(self, zeta: Array) -> tuple[LearnerStep, NormalEquations]:
+        terms = self._terms(zeta[None, :])
+        here = self._residual(terms)
+        omega, delta = here.omega, here.delta
+        weights = self.settings.gain_critic * self._row_weights(omega, terms.state_cost)
+        sample_error = np.nan
+        if self._samples is not None:
+            there = self._residual(self._samples)
+            omega, delta = np.vstack([omega, there.omega]), np.append(delta, there.delta)
+            weights = np.append(weights, self._sample_weights(there.omega))
+            sample_error = float(np.sqrt(np.mean((there.delta / self._samples.state_cost) ** 2)))
+        actors = (self.actor_1, self.actor_2)
+        seen = LearnerStep(
+            critic=self.critic,
+            actor_1=self.actor_1,
+            actor_2=self.actor_2,
+            bellman_error=float(here.delta[0]),
+            sample_error=sample_error,
+            projecting=any(self.projection.active(actor) for actor in actors),
+        )
+        offset = self.critic - self.reference
+        return seen, NormalEquations.of(omega, delta, weights, self._leash, offset)
 
     def _terms(self, points: Array) -> BellmanTerms:
         return BellmanTerms.at(points, self.functions.at(points), self.game)

@@ -26,7 +26,8 @@ _FORCE_UNITS = "N, N m"
 def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     """Return the record of a run.
 
-    Dimensions: `time` (control steps), `learn_time` (learning steps), `state`, `force`, `basis`.
+    Dimensions: `time` (control steps), `learn_time` (learning steps, each with the weights before it,
+    and the end of the run), `state`, `force`, `basis`.
     """
     m = len(history.critic[0]) if history.critic else 0
     over_time, over_learning = ("time",), ("learn_time",)

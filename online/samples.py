@@ -18,8 +18,13 @@ def draw_samples(half_widths: Array, n_samples: int, seed: int, *, inner: float 
     return half_widths * direction * rng.uniform(inner, 1.0, (n_samples, 1))
 
 
+def regressor_spectrum(omega: Array) -> Array:
+    """Return the eigenvalues of Σ ω_j ω_j' / p_j of (18), p_j = sqrt(1 + ω_j'ω_j), ascending, (m,)."""
+    return np.asarray(np.linalg.eigvalsh(_regressor_sum(omega)))
+
+
 def rank_margin(omega: Array) -> float:
-    """Return λ_min(Σ ω_j ω_j' / p_j) with p_j = sqrt(1 + ω_j'ω_j): (18) holds while it is positive.
+    """Return λ_min(Σ ω_j ω_j' / p_j): (18) holds while it is positive.
 
     `omega`: (N, m) regressors at the samples. Departs from the paper: (18) asks for the rank only; a
     uniform lower bound (its c) needs the infimum of this over time, so it is followed online.
@@ -27,13 +32,10 @@ def rank_margin(omega: Array) -> float:
     n_samples, m = omega.shape
     if n_samples < m:
         return 0.0
-    normalizer = np.sqrt(1.0 + np.sum(omega * omega, axis=1))
-    gram = (omega / normalizer[:, None]).T @ omega
-    least = scipy.linalg.eigvalsh(gram, subset_by_index=[0, 0])
+    least = scipy.linalg.eigvalsh(_regressor_sum(omega), subset_by_index=[0, 0])
     return float(max(least[0], 0.0))
 
 
-def spectrum(omega: Array) -> Array:
-    """Return all eigenvalues of Σ ω_j ω_j' / p_j in ascending order, shape (m,)."""
+def _regressor_sum(omega: Array) -> Array:
     normalizer = np.sqrt(1.0 + np.sum(omega * omega, axis=1))
-    return np.asarray(np.linalg.eigvalsh((omega / normalizer[:, None]).T @ omega))
+    return np.asarray((omega / normalizer[:, None]).T @ omega)

@@ -127,6 +127,8 @@ class SimulationSettings(Settings):
     tolerance : relative tolerance of the plant's integration
     pitch_limit : the run ends when |pitch| exceeds it [deg]
     chi : the run ends when a state exceeds this multiple of the full envelope's half-width
+    monitor_every : learning steps between two looks at the rank margin
+    seed : of the envelope states that `compare` adds
     """
 
     initial_state: tuple[float, ...] = Field(min_length=12, max_length=12)
@@ -137,4 +139,5 @@ class SimulationSettings(Settings):
     pitch_limit: Annotated[float, Field(gt=0.0, lt=90.0)] = 75.0
     chi: PositiveFloat = 2.0
     monitor_every: PositiveInt = 4
+    seed: NonNegativeInt = 1
     disturbance: DisturbanceSettings = DisturbanceSettings()

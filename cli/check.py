@@ -1,0 +1,37 @@
+"""`stationkeep check`: the paper's assumptions and conditions with their numbers."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+
+from ..comparison import check
+from .output import load_scenario, print_json, print_table, progress
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print every condition with its value for the scenario."""
+    scenario = load_scenario(options)
+    with progress(options) as tell:
+        tell("conditions", 0.0)
+        conditions = check(scenario)
+    if options.json:
+        print_json({"conditions": [asdict(condition) for condition in conditions]})
+        return 0
+    words = {True: "yes", False: "no", None: "not known"}
+    print_table(
+        f"The paper's conditions for '{options.scenario}'",
+        ["condition", "paper", "value", "bound", "holds", "note"],
+        [
+            [
+                c.name,
+                c.paper,
+                "–" if c.value is None else f"{c.value:.4g}",
+                "–" if c.bound is None else f"{c.bound:.4g}",
+                words[c.holds],
+                c.note,
+            ]
+            for c in conditions
+        ],
+    )
+    return 0

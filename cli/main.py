@@ -1,0 +1,145 @@
+"""`stationkeep COMMAND [SCENARIO]`: parse, run, and turn errors into one sentence and an exit code.
+
+0: done; 1: a run that did not converge or a certificate that failed, its results still written; 2: bad
+input. Nothing heavy is imported before a command is chosen.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+COMMANDS = {
+    "generate": "write, compile and verify the model functions of a scenario",
+    "online": "run the online learner in closed loop",
+    "offline": "solve for the certified offline optimum of the same game",
+    "compare": "run both and write figures, tables and an HTML report",
+    "check": "list the paper's assumptions and conditions with their numbers",
+    "sweep": "run a scenario over many states or settings (not available yet)",
+    "replay": "run a record again and compare (not available yet)",
+}
+NOT_YET = ("sweep", "replay")
+DEFAULT_SCENARIO = "bluerov2-heavy"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = parser().parse_args(_joined(given))
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("stationkeep: %(message)s"))
+    logger = logging.getLogger("stationkeep")
+    logger.addHandler(handler)
+    try:
+        return _run(options)
+    finally:
+        logger.removeHandler(handler)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from ..symbolic.errors import InputError, StationkeepError
+
+    try:
+        if options.command in NOT_YET:
+            raise InputError(
+                f"'{options.command}' is reserved and not available yet; use 'compare' for one scenario"
+            )
+        module = importlib.import_module(f".{options.command}", __package__)
+        return int(module.run(options))
+    except InputError as error:
+        print(f"stationkeep: {error}", file=sys.stderr)
+        return 2
+    except StationkeepError as error:
+        print(f"stationkeep: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("stationkeep: interrupted; what was finished is kept", file=sys.stderr)
+        return 1
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose error is one sentence."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        self.exit(2, f"stationkeep: {message}; see '{self.prog} --help'\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
+    top = _Parser(
+        prog="stationkeep",
+        description="Station keeping of underwater vehicles by an online-learned H-infinity policy, "
+        "beside the certified optimum of the same game.",
+    )
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name, purpose in COMMANDS.items():
+        command = commands.add_parser(
+            name, help=purpose, description=purpose[0].upper() + purpose[1:] + "."
+        )
+        _common_options(command)
+        if name == "generate":
+            command.add_argument(
+                "--virtual-machine",
+                action="store_true",
+                help="don't compile, use CasADi's virtual machine",
+            )
+        if name == "offline":
+            command.add_argument(
+                "--state",
+                action="append",
+                metavar="X,Y,Z,PHI,...",
+                help="initial state, 12 numbers [m, rad, m/s, rad/s] (repeatable)",
+            )
+            command.add_argument(
+                "--states", type=Path, metavar="FILE", help=".npy or CSV file of rows of 12 numbers"
+            )
+        if name == "compare":
+            command.add_argument(
+                "--n-states",
+                type=int,
+                default=1,
+                metavar="N",
+                help="compare from N states: the scenario's and N - 1 random ones of the envelope",
+            )
+    return top
+
+
+def _common_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "scenario",
+        nargs="?",
+        default=DEFAULT_SCENARIO,
+        help=f"a shipped name or the path of a TOML file (default: {DEFAULT_SCENARIO})",
+    )
+    command.add_argument("--out", type=Path, metavar="DIR", help="folder of the results")
+    command.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="SECTION.KEY=VALUE",
+        help="change a setting of the scenario (repeatable)",
+    )
+    command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
+    command.add_argument("--quiet", action="store_true", help="no progress on stderr")
+
+
+def _joined(arguments: list[str]) -> list[str]:
+    """Join `--state` and `--set` with their value, so that a value may begin with a minus sign."""
+    joined, i = [], 0
+    while i < len(arguments):
+        if arguments[i] in ("--state", "--set") and i + 1 < len(arguments):
+            joined.append(f"{arguments[i]}={arguments[i + 1]}")
+            i += 1
+        else:
+            joined.append(arguments[i])
+        i += 1
+    return joined
+
+
+if __name__ == "__main__":
+    sys.exit(main())

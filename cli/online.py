@@ -1,0 +1,75 @@
+"""`stationkeep online`: run the learner in closed loop and keep the record."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..comparison.metrics import dissipation_margin, run_metrics
+from ..comparison.runs import online_record
+from .output import load_scenario, output_folder, print_json, print_table, progress
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the scenario's learner, write its record and print what came out."""
+    scenario = load_scenario(options)
+    station = scenario.station_keeping()
+    path = output_folder(options) / "learned.nc"
+    duration = scenario.simulation.duration
+    with progress(options) as tell:
+        record = online_record(scenario, path, progress=lambda t: tell("learned run", t / duration))
+    metrics = run_metrics(record, station, None)
+    stopped = metrics.stopped
+    answer: dict[str, Any] = {
+        "weights": {name: _last(record, name) for name in ("critic", "actor_1", "actor_2")},
+        "bellman_error": _last(record, "bellman_error"),
+        "sample_error": _last(record, "sample_error"),
+        "rank_margin": _last(record, "rank_margin"),
+        "cost": metrics.cost,
+        "final_state": record["zeta"].values[-1],
+        "real_time_factor": float(record["time"][-1]) / float(record.attrs["wall_seconds"]),
+        "stopped": stopped,
+        "record": path,
+    }
+    if scenario.simulation.mode == "disturbed":
+        start = scenario.initial_state
+        linear_value = float(start @ station.problem.P @ start)
+        answer["dissipation_margin"] = dissipation_margin(record, station, linear_value)
+        answer["notes"] = {
+            "cost": "of the game, the disturbance's share subtracted",
+            "dissipation_margin": "with ζ'P ζ for the value at both ends",
+        }
+    if options.json:
+        print_json(answer)
+    else:
+        _print(answer, scenario.simulation.mode)
+    return 0 if stopped is None else 1
+
+
+def _last(record: xr.Dataset, name: str) -> Any:
+    values = record[name].values
+    return values[-1] if len(values) else None
+
+
+def _print(answer: dict[str, Any], mode: str) -> None:
+    final = np.array2string(np.asarray(answer["final_state"]), precision=4, suppress_small=True)
+    rows = [
+        ["cost (with ζ'P ζ for the rest)", _form(answer["cost"], ".4f")],
+        ["Bellman error at the state [cost/s]", _form(answer["bellman_error"], ".2e")],
+        ["Bellman error at the samples, rms, relative", _form(answer["sample_error"], ".3f")],
+        ["rank margin of (18)", _form(answer["rank_margin"], ".2e")],
+        ["simulated time over wall time", _form(answer["real_time_factor"], ".1f")],
+        ["final state", final],
+        ["ended early", answer["stopped"] or "no"],
+        ["record", str(answer["record"])],
+    ]
+    if "dissipation_margin" in answer:
+        rows.insert(1, ["dissipation margin", _form(answer["dissipation_margin"], ".4f")])
+    print_table(f"Online run, mode '{mode}'", ["", ""], rows)
+
+
+def _form(value: float | None, form: str) -> str:
+    return "–" if value is None else f"{value:{form}}"

@@ -1,0 +1,96 @@
+"""What the commands print: tables and one JSON object on stdout, progress on stderr."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from ..comparison import Scenario
+
+
+class Tell(Protocol):
+    """Show the name of the present stage and the part of it that is done, 0 to 1."""
+
+    def __call__(self, stage: str, part: float) -> None:
+        """Update the progress line."""
+        ...
+
+
+def load_scenario(options: argparse.Namespace) -> Scenario:
+    """Return the scenario of the command line; raises InputError."""
+    return Scenario.load(options.scenario, options.overrides)
+
+
+def output_folder(options: argparse.Namespace) -> Path:
+    """Return --out, or results/<scenario>."""
+    chosen: Path | None = options.out
+    return chosen if chosen is not None else Path("results") / Path(options.scenario).stem
+
+
+@contextmanager
+def progress(options: argparse.Namespace) -> Iterator[Tell]:
+    """Yield a function that shows the present stage on stderr; silent with --quiet."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f} %"),
+        TimeElapsedColumn(),
+    )
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=options.quiet, transient=True) as bar:
+        tasks: dict[str, Any] = {}
+
+        def tell(stage: str, part: float) -> None:
+            if stage not in tasks:
+                for task in tasks.values():
+                    bar.update(task, completed=1.0)
+                tasks[stage] = bar.add_task(stage, total=1.0)
+            bar.update(tasks[stage], completed=part)
+
+        yield tell
+
+
+def print_json(data: dict[str, Any]) -> None:
+    """Print one JSON object; numbers that are not finite become null."""
+    print(json.dumps(plain(data), ensure_ascii=False))
+
+
+def plain(value: Any) -> Any:
+    """Return a value as JSON knows it."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if math.isfinite(value) else None
+    return str(value) if isinstance(value, Path) else value
+
+
+def print_table(title: str, header: Iterable[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table on stdout; columns of numbers are aligned on the right."""
+    console = Console(width=None if sys.stdout.isatty() else 150, highlight=False)
+    table = Table(title=title, title_justify="left", title_style="bold")
+    listed = [[str(cell) for cell in row] for row in rows]
+    for i, name in enumerate(header):
+        numbers = all(row[i][:1] in "0123456789-–" for row in listed)
+        table.add_column(name, justify="right" if numbers else "left", overflow="fold")
+    for row in listed:
+        table.add_row(*row)
+    console.print(table)

@@ -1,0 +1,139 @@
+"""The runs of a scenario as records that are kept: made once, reused while nothing has changed."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..offline import OfflineSolution, OfflineSolver
+from ..online import Policy, load, run, save, to_dataset
+from ..online.closed_loop import STATE_NAMES, Progress
+from ..online.record import versions
+from ..symbolic import InputError
+from ..symbolic.vehicle import Array
+from .scenario import Scenario
+
+OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
+
+
+def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -> dict[str, Any]:
+    """Return the attributes that say where a record comes from.
+
+    `key` is the hash of what the numbers depend on: the settings (those named in `include`, or all),
+    the vehicle's parameters and the versions.
+    """
+    vehicle = scenario.station_keeping().model.vehicle
+    text = scenario.model_dump_json(include=include)
+    parts = [kind, text, vehicle.model_dump_json(), repr(sorted(versions().items()))]
+    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
+    return {
+        "kind": kind,
+        "scenario": scenario.model_dump_json(),
+        "vehicle": vehicle.model_dump_json(),
+        "seed": scenario.samples.seed,
+        "key": key,
+    }
+
+
+def online_record(
+    scenario: Scenario,
+    path: Path | None = None,
+    *,
+    policy: Callable[[], Policy] | None = None,
+    kind: str = "learned",
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Return the record of a closed-loop run, from `path` if it holds this very run.
+
+    Parameters
+    ----------
+    policy : makes what drives the vehicle; the scenario's controller if None
+    kind : names the policy in the record
+    """
+    attributes = provenance(scenario, kind)
+
+    def make() -> xr.Dataset:
+        history = run(scenario, None if policy is None else policy(), progress)
+        attributes["wall_seconds"] = history.wall_seconds
+        return to_dataset(history, attributes)
+
+    record = _reuse(path, attributes["key"], make)
+    if str(record.attrs["stopped"]).startswith("interrupted"):
+        raise KeyboardInterrupt  # the part that was run is kept
+    return record
+
+
+def optimal_record(
+    scenario: Scenario, solver: OfflineSolver, path: Path | None = None, zeta0: Array | None = None
+) -> xr.Dataset:
+    """Return the record of the offline optimum from ζ_0, from `path` if it holds this very solve."""
+    start = scenario.initial_state if zeta0 is None else zeta0
+    attributes = provenance(scenario, f"optimal from {start.tolist()}", OFFLINE_KEY)
+
+    def make() -> xr.Dataset:
+        return optimum_to_dataset(scenario, solver.solve(start), attributes)
+
+    return _reuse(path, attributes["key"], make)
+
+
+def optimum_to_dataset(
+    scenario: Scenario, solution: OfflineSolution, attributes: dict[str, Any]
+) -> xr.Dataset:
+    """Return the record of an offline solution: trajectory, forces, cost and certificate."""
+    path, direct = solution.direct.trajectory, solution.direct
+    station = scenario.station_keeping()
+    u_control, u_disturbance = path.players(station.game)
+    tau_b = [
+        station.model.kinematics(zeta[:6])[0].T @ (u + station.model.u_trim)
+        for zeta, u in zip(path.states[1:], u_control, strict=True)
+    ]
+    game = station.game
+    local = game.local_cost(path.states[1:], u_control, u_disturbance)
+    forces, states = ("node", "force"), ("time", "state")
+    units = {"units": "N, N m"}
+    data = {
+        "zeta": (states, path.states, {"units": "m, rad, m/s, rad/s"}),
+        "u_control": (forces, u_control, units),
+        "u_disturbance": (forces, u_disturbance, units),
+        "tau_b": (forces, np.array(tau_b), units),
+        "local_cost": (("node",), local, {"units": "cost/s"}),
+        "cost": (("time",), path.quadrature(local), {"units": "cost"}),
+        "costate": (("state",), direct.costate, {"units": "cost per unit of the state"}),
+    }
+    coordinates = {
+        "time": ("time", path.times, {"units": "s"}),
+        "node": ("node", path.times[1:], {"units": "s"}),
+        "state": list(STATE_NAMES),
+    }
+    attributes = {
+        **attributes,
+        **versions(),
+        **{name: float(value) for name, value in vars(solution.certificate).items()},
+        "value": direct.value,
+        "iterations": direct.iterations,
+        "seconds": direct.seconds,
+        "certified_seconds": solution.seconds,
+        "faults": "; ".join(solution.faults),
+    }
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def _reuse(path: Path | None, key: str, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+    if path is not None and path.is_file():
+        try:
+            kept = load(path)
+            # an interrupted run is made again; one that ended by itself would end so again
+            whole = not str(kept.attrs.get("stopped", "")).startswith("interrupted")
+            if kept.attrs.get("key") == key and whole:
+                return kept
+        except InputError:
+            pass  # a record that can't be read is made again
+    dataset = make()
+    if path is not None:
+        save(dataset, path)
+    return dataset
