@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import logging
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,6 +29,9 @@ DEFAULT_SCENARIO = "bluerov2-heavy"
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
+    # one BLAS thread: the matrices are small, and the numbers don't depend on the number of cores
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = parser().parse_args(_joined(given))
     handler = logging.StreamHandler()

@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
         linear_value = float(start @ station.problem.P @ start)
         answer["dissipation_margin"] = dissipation_margin(record, station, linear_value)
         answer["notes"] = {
-            "cost": "of the game, the disturbance's share subtracted",
+            "cost": "integral of ζ'Qζ + u_1'R u_1, with ζ'P ζ for the rest",
             "dissipation_margin": "with ζ'P ζ for the value at both ends",
         }
     if options.json:

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
@@ -90,7 +91,7 @@ def print_table(title: str, header: Iterable[str], rows: Iterable[Sequence[str]]
     listed = [[str(cell) for cell in row] for row in rows]
     for i, name in enumerate(header):
         numbers = all(row[i][:1] in "0123456789-–" for row in listed)
-        table.add_column(name, justify="right" if numbers else "left", overflow="fold")
+        table.add_column(escape(name), justify="right" if numbers else "left", overflow="fold")
     for row in listed:
-        table.add_row(*row)
+        table.add_row(*(escape(cell) for cell in row))
     console.print(table)

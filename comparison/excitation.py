@@ -11,11 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from ..offline import Plant
 from ..online import Learner, LearnerSettings, draw_samples
 from ..symbolic import Basis, Problem, RunError, quadratic
+from ..symbolic.integration import integrate
 from ..symbolic.vehicle import Array
 from .scenario import Scenario
 
@@ -165,8 +165,10 @@ def _advance(learner: Learner, plant: Plant, zeta: Array, dt: float) -> Array:
         u_control, u_disturbance = learner.policies(state)
         return plant.rate(state, u_control + u_disturbance)
 
-    answer = solve_ivp(rhs, (0.0, dt), zeta, "RK45", rtol=1e-6, atol=1e-8, first_step=dt / 4)
-    reached = answer.y[:, -1]
-    if not answer.success or np.abs(reached / plant.problem.scale).max() > 10.0:
+    span = np.array([0.0, dt])
+    reached = integrate(
+        rhs, zeta, span, rtol=1e-6, atol=1e-8, method="RK45", first_step=dt / 4, max_calls=5000
+    )[-1]
+    if np.abs(reached / plant.problem.scale).max() > 10.0:
         raise RunError("the state left ten times the envelope")
     return np.asarray(reached)

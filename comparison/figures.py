@@ -15,6 +15,7 @@ from ..symbolic import RunError, StationKeeping, Thrusters
 from ..symbolic.vehicle import Array
 from .compare import Comparison
 from .excitation import ExcitationRun
+from .metrics import cost_to_date
 from .style import LEARNED, LINEAR, OPTIMAL, PALETTE, figure, legend_above, legend_below
 
 Panel = tuple[str, float]
@@ -191,7 +192,7 @@ def draw_cost(path: Path, records: dict[str, xr.Dataset], optimal: xr.Dataset) -
         total.plot(optimal["time"], optimal["cost"], "--", color=OPTIMAL, label="optimal", zorder=3)
         for name, record in records.items():
             time = record["time"].values
-            cost = record["cost"].values - record["attenuated"].values
+            cost = cost_to_date(record)
             total.plot(time, cost, color=colors[name], label=_label(name))
             excess.plot(*_excess(record, optimal), color=colors[name], label=_label(name))
         total.set_title("Cost to date [-]")
@@ -268,7 +269,7 @@ def _label(name: str) -> str:
 def _excess(record: xr.Dataset, optimal: xr.Dataset) -> tuple[Array, Array]:
     """Return times and the cost to date above the optimum's, in percent of V*."""
     time = record["time"].values
-    cost = record["cost"].values - record["attenuated"].values
+    cost = cost_to_date(record)
     reference = np.interp(time, optimal["time"].values, optimal["cost"].values)
     return time, np.asarray(100.0 * (cost - reference) / float(optimal.attrs["value"]))
 

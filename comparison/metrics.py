@@ -18,7 +18,8 @@ class RunMetrics:
 
     Attributes
     ----------
-    cost : of the game, integral of r of (5) plus ζ(T)'P ζ(T) for the rest; None if the run ended early
+    cost : integral of r of (5) in `game` mode, of ζ'Qζ + u_1'R u_1 in `disturbed` mode, plus
+        ζ(T)'P ζ(T) for the rest; None if the run ended early
     regret : (cost - V*) / V*; None without an optimum or if the run ended early
     position_rms : [m]
     effort : integral of |τ_b force|^2 [N^2 s]
@@ -37,14 +38,14 @@ class RunMetrics:
 def run_metrics(record: xr.Dataset, station: StationKeeping, optimum: float | None) -> RunMetrics:
     """Return the figures of merit of a closed-loop record against V* = `optimum`.
 
-    The value of the single-player equivalent; u_2 is what the run's own disturbance player did.
+    In `game` mode u_2 is what the run's own disturbance player did.
     """
     stopped = str(record.attrs["stopped"]) or None
     zeta, time = record["zeta"].values, record["time"].values
     cost = None
     if stopped is None:
         rest = float(zeta[-1] @ station.problem.P @ zeta[-1])
-        cost = float(record["cost"].values[-1] - record["attenuated"].values[-1]) + rest
+        cost = float(cost_to_date(record)[-1]) + rest
     tau_b = record["tau_b"].values
     return RunMetrics(
         cost=cost,
@@ -54,6 +55,14 @@ def run_metrics(record: xr.Dataset, station: StationKeeping, optimum: float | No
         peak_thrust=peak_thrust(tau_b, station.model.vehicle),
         stopped=stopped,
     )
+
+
+def cost_to_date(record: xr.Dataset) -> Array:
+    """Return the cost up to each time, (time,): of the game, or of a `disturbed` run's control."""
+    spent = record["cost"].values
+    if record.attrs["mode"] == "disturbed":
+        return np.asarray(spent)
+    return np.asarray(spent - record["attenuated"].values)
 
 
 def peak_thrust(tau_b: Array, vehicle: Vehicle) -> float | None:

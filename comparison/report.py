@@ -87,15 +87,8 @@ def verdict(comparison: Comparison) -> str:
 
 def summary(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of the summary: one row a policy."""
-    header = [
-        "policy",
-        "cost",
-        "regret [%]",
-        "position rms [m]",
-        "effort [N² s]",
-        "peak thrust [%]",
-        "",
-    ]
+    columns = "policy, cost, regret [%], position rms [m], effort [N² s], peak thrust [%], ended early"
+    header = columns.split(", ")
     rows = []
     for name, metrics in comparison.metrics.items():
         rows.append(

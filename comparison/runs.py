@@ -35,6 +35,7 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
         "kind": kind,
         "scenario": scenario.model_dump_json(),
         "vehicle": vehicle.model_dump_json(),
+        "mode": scenario.simulation.mode,
         "seed": scenario.samples.seed,
         "key": key,
     }

@@ -30,8 +30,8 @@ class DirectSolution:
     defect : largest gap between collocated and re-integrated mesh states, in half-widths
     reintegrated_value : the value along the re-integrated trajectory
     hji_residual : |H| of (7) at ζ with the costate, relative to ζ'Qζ
-    iterations : of IPOPT
-    seconds : wall time of the solve
+    iterations : of IPOPT, all rounds of mesh alignment together
+    seconds : wall time of IPOPT and its starting guess, likewise
     """
 
     zeta: Array
@@ -127,6 +127,7 @@ class DirectSolver:
         changes, put mesh points on them, and repeat until they move by less than `tolerance` [s].
         """
         solution = self.solve(zeta0, verify=False)
+        iterations, seconds = solution.iterations, solution.seconds
         known = np.empty(0)
         for _ in range(rounds):
             events = sign_changes(self.plant, solution.trajectory)
@@ -135,8 +136,17 @@ class DirectSolver:
             known = events
             mesh = aligned_mesh(self.mesh, events)
             solution = self.solve(zeta0, mesh=mesh, guess=solution.trajectory, verify=False)
+            iterations += solution.iterations
+            seconds += solution.seconds
         defect, value = reintegrate(self.plant, zeta0, solution.trajectory)
-        return replace(solution, defect=defect, reintegrated_value=value), known
+        checked = replace(
+            solution,
+            defect=defect,
+            reintegrated_value=value,
+            iterations=iterations,
+            seconds=seconds,
+        )
+        return checked, known
 
     def _linear_guess(self, program: Transcription, zeta0: Array, times: Array) -> tuple[Array, Array]:
         """Simulate the linear H-infinity policy; beyond a failure, decay to rest."""

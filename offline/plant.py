@@ -7,9 +7,9 @@ from collections.abc import Callable
 import casadi
 import numpy as np
 from casadi import SX
-from scipy.integrate import solve_ivp
 
-from ..symbolic import Kernel, Problem, RunError
+from ..symbolic import Kernel, Problem
+from ..symbolic.integration import integrate
 from ..symbolic.kernel import dense_function
 from ..symbolic.vehicle import Array
 
@@ -70,7 +70,7 @@ class Plant:
         Raises
         ------
         RunError
-            If the integration fails.
+            If the integration fails or becomes too stiff.
         """
         game, n = self.problem.game, self.problem.n_states
 
@@ -80,24 +80,16 @@ class Plant:
             running = zeta @ game.Q @ zeta + v @ game.R_eff @ v
             return np.append(self.rate(zeta, v), running)
 
-        def integrate(y: Array, span: Array) -> Array:
+        def advance(y: Array, span: Array) -> Array:
             scale = np.append(self.problem.scale, max(y[-1], 1.0))
-            atol = tolerance * 1e-2 * scale
-            answer = solve_ivp(
-                rhs, (span[0], span[-1]), y, "DOP853", t_eval=span[1:], rtol=tolerance, atol=atol
-            )
-            if not answer.success or not np.all(np.isfinite(answer.y)):
-                raise RunError(
-                    f"the simulation of {self.problem.name} failed after t = {span[0]:.2f} s"
-                )
-            return np.asarray(answer.y.T)
+            return integrate(rhs, y, span, rtol=tolerance, atol=tolerance * 1e-2 * scale)
 
         start = np.append(zeta0, 0.0)
         if restart:
             rows = [start]
             for i in range(len(times) - 1):
-                rows.append(integrate(rows[-1], times[i : i + 2])[-1])
+                rows.append(advance(rows[-1], times[i : i + 2])[-1])
             stacked = np.array(rows)
         else:
-            stacked = np.vstack([start, integrate(start, times)])
+            stacked = np.vstack([start, advance(start, times)])
         return stacked[:, :n], stacked[:, n]

@@ -8,10 +8,10 @@ from itertools import pairwise
 import casadi
 import numpy as np
 from casadi import DM, SX
-from scipy.integrate import solve_ivp
 
-from ..symbolic import RunError, StationKeeping
+from ..symbolic import StationKeeping
 from ..symbolic.dynamics import acceleration, earth_frame
+from ..symbolic.integration import integrate
 from ..symbolic.kernel import dense_function, export
 from ..symbolic.kinematics import jacobian, jacobian_inverse
 from ..symbolic.vehicle import Array
@@ -71,24 +71,21 @@ class HeldPlant:
         Raises
         ------
         RunError
-            If the integration fails or anything is not finite.
+            If the integration fails or becomes too stiff, or anything is not finite.
         """
         y = np.append(state.zeta, [state.cost, state.attenuated])
         edges = [t, *(b for b in self.source.breaks if t < b < t + dt), t + dt]
         absolute = self.tolerance * np.append(1e-2 * self.station.half_widths, [1e-2, 1e-2])
         for start, end in pairwise(edges):
-            answer = solve_ivp(
+            y = integrate(
                 lambda s, x: self.rates(s, x[:12], tau_b, tau_d)[0],
-                (start, end),
                 y,
-                "DOP853",
+                np.array([start, end]),
                 rtol=self.tolerance,
                 atol=absolute,
                 first_step=end - start,
-            )
-            y = answer.y[:, -1]
-            if not answer.success or not np.all(np.isfinite(y)):
-                raise RunError(f"the plant's integration failed at t = {start:.2f} s")
+                max_calls=20_000,
+            )[-1]
         return PlantState(y[:12], float(y[12]), float(y[13]))
 
 

@@ -107,7 +107,12 @@ class Basis:
         InputError
             If the function does not return a column of expressions.
         """
-        sigma = function(zeta / DM(scale))
+        try:
+            sigma = function(zeta / DM(scale))
+        except InputError:
+            raise
+        except Exception as error:
+            raise InputError(f"basis '{name}': the function raises {_one_line(error)}") from error
         if not isinstance(sigma, SX) or sigma.shape[1] != 1 or sigma.shape[0] == 0:
             raise InputError(
                 f"basis '{name}': the function must return one column of casadi.SX expressions, "
@@ -183,7 +188,7 @@ def find_function(name: str) -> BasisFunction:
     try:
         specification.loader.exec_module(module)
     except Exception as error:
-        raise InputError(f"'{file}' can't be loaded ({type(error).__name__}: {error})") from error
+        raise InputError(f"'{file}' can't be loaded ({_one_line(error)})") from error
     function = getattr(module, attribute, None)
     if not callable(function):
         raise InputError(f"'{file}' has no function '{attribute}'")
@@ -196,3 +201,7 @@ def _require_vehicle_state(x: SX, name: str) -> None:
             f"basis '{name}' needs the 12 states of a vehicle, but there are {x.shape[0]}; "
             "use 'quadratic'"
         )
+
+
+def _one_line(error: Exception) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

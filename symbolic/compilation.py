@@ -69,12 +69,19 @@ def find_compiler() -> Compiler | None:
         path = shutil.which(name)
         if path:
             return Compiler(path, _version(path))
+    if chosen:
+        raise CompilationError(f"the C compiler '{chosen}' that $CC names was not found")
     return None
 
 
 @cache
 def _version(path: str) -> str:
-    answer = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
+    try:
+        answer = subprocess.run(
+            [path, "--version"], capture_output=True, text=True, errors="replace", check=False
+        )
+    except OSError as error:
+        raise CompilationError(f"the C compiler '{path}' can't be run ({error.strerror})") from None
     return answer.stdout.partition("\n")[0]
 
 
@@ -95,7 +102,7 @@ def compile_function(function: casadi.Function) -> Library:
     """
     compiler = find_compiler()
     if compiler is None:
-        raise CompilationError("no C compiler was found ($CC, cc, gcc, clang)")
+        raise CompilationError("no C compiler was found (cc, gcc, clang)")
     source = c_source(function)
     key = _key(source, compiler)
     entry = cache_folder() / key
@@ -147,9 +154,10 @@ def _build(source: str, compiler: Compiler, entry: Path) -> None:
         code, library = folder / "function.c", folder / "function.so"
         code.write_text(source, encoding="utf-8")
         command = [compiler.path, *FLAGS, str(code), "-o", str(library), "-lm"]
-        answer = subprocess.run(command, capture_output=True, text=True, check=False)
+        answer = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
         if answer.returncode != 0 or not library.is_file():
             fault = (answer.stderr.strip() or "no message").partition("\n")[0]
+            fault = fault.replace(f"{folder}{os.sep}", "")
             raise CompilationError(f"'{compiler.path}' failed ({fault})")
         manifest = {"sha256": _digest(library), "compiler": compiler.version, "flags": FLAGS}
         (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
@@ -172,7 +180,7 @@ def _publish(folder: Path, entry: Path) -> None:
             broken = entry.parent / f"{_TEMPORARY}broken-{uuid.uuid4().hex}"
             with contextlib.suppress(FileNotFoundError):
                 entry.rename(broken)
-            shutil.rmtree(broken, ignore_errors=True)
+            _remove(broken)
     raise CompilationError(f"the cache entry '{entry}' is broken and can't be replaced; delete it")
 
 
@@ -180,4 +188,11 @@ def _remove_stale(folder: Path) -> None:
     for left in folder.glob(f"{_TEMPORARY}*"):
         with contextlib.suppress(OSError):
             if time.time() - left.stat().st_mtime > _STALE_AFTER:
-                shutil.rmtree(left, ignore_errors=True)
+                _remove(left)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

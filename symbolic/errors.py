@@ -50,6 +50,6 @@ class GammaTooSmallError(InputError):
 
 def nearest(given: str, known: Iterable[str]) -> str:
     """Return a half-sentence that names the known word nearest to `given`."""
-    words = sorted(known)
-    close = difflib.get_close_matches(given, words, n=1, cutoff=0.4)
-    return f"did you mean '{close[0]}'?" if close else f"known are {', '.join(words)}"
+    words = {word.lower(): word for word in sorted(known)}
+    close = difflib.get_close_matches(given.lower(), list(words), n=1, cutoff=0.5)
+    return f"did you mean '{words[close[0]]}'?" if close else f"known are {', '.join(words.values())}"

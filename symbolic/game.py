@@ -34,7 +34,7 @@ def _weight(name: str, value: ArrayLike) -> Array:
         raise InputError(f"{name} must be a matrix of numbers") from None
     if matrix.ndim == 1:
         matrix = np.diag(matrix)
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
         raise InputError(f"{name} has shape {matrix.shape}, but must be a diagonal or square matrix")
     if not np.all(np.isfinite(matrix)):
         raise InputError(f"{name} contains a number that is not finite; correct it")

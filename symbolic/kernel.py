@@ -89,7 +89,10 @@ def export(
     if compiled:
         try:
             library = compile_function(function)
-            external = Kernel(casadi.external(function.name(), str(library.path)))
+            try:
+                external = Kernel(casadi.external(function.name(), str(library.path)))
+            except RuntimeError:
+                raise CompilationError("what the C compiler built can't be loaded") from None
             difference = max_difference(kernel, external, n_points=1 if mapped else 20)
             if difference > TOLERANCE:
                 raise CompilationError(

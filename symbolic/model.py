@@ -39,7 +39,11 @@ class Model:
     def __init__(
         self, vehicle: Vehicle, current: Vector3 = (0.0, 0.0, 0.0), *, compiled: bool = True
     ) -> None:
-        if len(current) != 3 or not np.all(np.isfinite(current)):
+        try:
+            finite = np.isfinite(np.array(current, dtype=float))
+        except (TypeError, ValueError):
+            finite = np.zeros(0, dtype=bool)
+        if finite.shape != (3,) or not finite.all():
             raise InputError(f"the current is {current}, but must be three finite numbers in m/s")
         self.vehicle = vehicle
         self.current = current

@@ -52,7 +52,7 @@ class Problem:
                 f"{self.name}: Q is {self.game.Q.shape} and R is {self.game.R.shape}, but "
                 f"{n} states and {k} inputs need {(n, n)} and {(k, k)}"
             )
-        if self.scale.shape != (n,) or not np.all(self.scale > 0.0):
+        if self.scale.shape != (n,) or not np.all(np.isfinite(self.scale) & (self.scale > 0.0)):
             raise InputError(f"{self.name}: the scale must be {n} positive half-widths")
         residual = float(np.abs(self._at_origin(self.drift)).max())
         if not residual < 1e-9:
@@ -126,9 +126,9 @@ def closed_form_problem(R: float = 1.0, gamma: float = 2.0) -> Problem:
     """
     zeta = SX.sym("zeta", 2)
     c = casadi.cos(2 * zeta[0]) + 2
+    game = Game(np.eye(2), np.array([R]), np.eye(1), gamma)
     k = 1 / R - gamma**-2
     drift = casadi.vertcat(-zeta[0] + zeta[1], -zeta[0] / 2 - zeta[1] / 2 * (1 - k * c**2))
-    game = Game(np.eye(2), np.array([R]), np.eye(1), gamma)
     return Problem(
         "two-state game", zeta, drift, casadi.vertcat(SX(1, 1), c), game, np.array([2.0, 2.0])
     )

@@ -77,6 +77,11 @@ def gamma_star(A: Array, B: Array, Q: Array, R: Array, W_d: Array, tolerance: fl
     upper = 2.0 * gamma_threshold(R, W_d)
     while not solvable(upper):
         upper *= 2.0
+        if upper > 1e12 * gamma_threshold(R, W_d):
+            raise InputError(
+                "the linearised game has no stabilising solution at any gamma; Q must see every mode "
+                "that is not damped, and the weights must not differ by many powers of ten"
+            )
     lower = 0.0
     while upper - lower > tolerance * upper:
         middle = 0.5 * (lower + upper)

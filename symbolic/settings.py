@@ -82,8 +82,17 @@ def validate(model: type[S], data: dict[str, Any], where: str) -> S:
 
 
 def _sentence(model: type[BaseModel], error: ValidationError) -> str:
-    fault = error.errors()[0]
-    location = fault["loc"]
+    # the fault that explains the others: a misspelt key before the missing one, a NaN before the shape
+    order = {"extra_forbidden": 0, "finite_number": 1}
+    fault = min(error.errors(), key=lambda found: order.get(found["type"], 2))
+    location = tuple(part for part in fault["loc"] if "[" not in str(part))  # without union labels
+    if (
+        fault["type"] in ("missing", "too_long")
+        and fault["loc"]
+        and not isinstance(fault["input"], dict)
+    ):
+        key = ".".join(part for part in location if isinstance(part, str))
+        return f"'{key}' is {_shown(fault['input'])}, but has the wrong number of entries; correct it"
     key = ".".join(str(part) for part in location)
     given = fault.get("input")
     if fault["type"] == "extra_forbidden":
@@ -94,10 +103,17 @@ def _sentence(model: type[BaseModel], error: ValidationError) -> str:
     if fault["type"] == "value_error":
         message = str(fault["ctx"]["error"])
         return f"'{key}': {message}" if key else message
-    text = repr(given)
-    shown = text if len(text) <= 60 else text[:57] + "..."
+    kinds = {"list_type": "an array", "tuple_type": "an array", "model_type": "a table"}
+    kinds |= {"float_type": "a number", "float_parsing": "a number"}
     requirement = str(fault["msg"]).replace("Input should be", "it must be")
-    return f"'{key}' is {shown}, but {requirement}; correct it"
+    if fault["type"] in kinds:
+        requirement = f"it must be {kinds[fault['type']]}"
+    return f"'{key}' is {_shown(given)}, but {requirement}; correct it"
+
+
+def _shown(given: object) -> str:
+    text = repr(given)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _fields_at(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
