@@ -75,16 +75,19 @@ def peak_thrust(tau_b: Array, vehicle: Vehicle) -> float | None:
 
 
 def distribution(regrets: list[float | None]) -> dict[str, Any]:
-    """Return median, 90 % quantile and maximum of the finished runs, and the number that did not."""
+    """Return median, 90 % quantile and maximum of the finished runs, the number that ended early
+    (`diverged`) and the number of all (`n`).
+    """
     finished = [regret for regret in regrets if regret is not None]
     diverged = len(regrets) - len(finished)
     if not finished:
-        return {"median": None, "p90": None, "max": None, "diverged": diverged}
+        return {"median": None, "p90": None, "max": None, "diverged": diverged, "n": len(regrets)}
     return {
         "median": float(np.median(finished)),
         "p90": float(np.quantile(finished, 0.9)),
         "max": float(np.max(finished)),
         "diverged": diverged,
+        "n": len(regrets),
     }
 
 

@@ -19,7 +19,7 @@ table { border-collapse: collapse; width: 100%; font-size: .9rem; }
 .wide { overflow-x: auto; }
 th, td { text-align: left; padding: .3rem .7rem .3rem 0; border-bottom: 1px solid #ddd;
          vertical-align: top; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 pre { background: #f4f4f4; padding: .8rem; overflow-x: auto; font-size: .85rem; }
 .lead { font-size: 1.15rem; } .fault { color: #a31515; }
 """
@@ -77,11 +77,12 @@ def verdict(comparison: Comparison) -> str:
     learned, linear = (comparison.regret[name]["median"] for name in ("learned", "linear"))
     if learned is None or linear is None:
         return "A run ended early, so there is no regret to compare."
-    word = "less" if learned < linear else "more"
+    change = 100 * (learned - linear) / linear
+    outcome = f"takes {-change:.0f} % off" if change < 0 else f"adds {change:.0f} % to"
     states = "" if comparison.n_states == 1 else f" (median of {comparison.n_states} states)"
     return (
         f"The learned policy costs {100 * learned:.2f} % more than the optimum{states}; the linear "
-        f"H-infinity policy, which learns nothing, {100 * linear:.2f} %: learning costs {word}."
+        f"H-infinity policy, which learns nothing, {100 * linear:.2f} %: learning {outcome} the excess."
     )
 
 
@@ -152,14 +153,24 @@ def _figure(key: str, path: Path) -> str:
 
 
 def _table(header: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
-    head = "".join(f"<th>{escape(cell)}</th>" for cell in header)
+    rows = list(rows)
+    numeric = [_is_number(cell) for cell in rows[0]] if rows else []
+    head = "".join(
+        f'<th class="number">{escape(cell)}</th>' if number else f"<th>{escape(cell)}</th>"
+        for cell, number in zip(header, numeric, strict=True)
+    )
     lines = "".join(f"<tr>{''.join(_cell(cell) for cell in row)}</tr>" for row in rows)
     return f'<div class="wide"><table><tr>{head}</tr>{lines}</table></div>'
 
 
 def _cell(text: str) -> str:
-    number = text[:1].isdigit() or text[:1] == "-"
-    return f'<td class="number">{escape(text)}</td>' if number else f"<td>{escape(text)}</td>"
+    if _is_number(text):
+        return f'<td class="number">{escape(text)}</td>'
+    return f"<td>{escape(text)}</td>"
+
+
+def _is_number(text: str) -> bool:
+    return text[:1].isdigit() or text[:1] == "-"
 
 
 def _number(value: float | None, form: str, factor: float = 1.0) -> str:

@@ -18,6 +18,7 @@ from ..symbolic import InputError
 from ..symbolic.vehicle import Array
 from .scenario import Scenario
 
+FORMAT = 1  # of the records; raise it when what is in them, or how a run is made, changes
 OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
 
 
@@ -25,11 +26,13 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
     """Return the attributes that say where a record comes from.
 
     `key` is the hash of what the numbers depend on: the settings (those named in `include`, or all),
-    the vehicle's parameters and the versions.
+    the vehicle's parameters, the compiled functions and the versions.
     """
-    vehicle = scenario.station_keeping().model.vehicle
+    station = scenario.station_keeping()
+    vehicle = station.model.vehicle
     text = scenario.model_dump_json(include=include)
-    parts = [kind, text, vehicle.model_dump_json(), repr(sorted(versions().items()))]
+    parts = [str(FORMAT), kind, text, vehicle.model_dump_json(), station.fingerprint]
+    parts.append(repr(sorted(versions().items())))
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     return {
         "kind": kind,
@@ -37,6 +40,7 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
         "vehicle": vehicle.model_dump_json(),
         "mode": scenario.simulation.mode,
         "seed": scenario.samples.seed,
+        "functions": station.fingerprint,
         "key": key,
     }
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
 from .basis import Basis
+from .compilation import c_source
 from .game import Game
+from .kernel import dense_function
 from .model import Model
 from .problem import Problem
 from .value import ValueFunctions
@@ -41,6 +44,17 @@ class StationKeeping:
     def functions(self) -> ValueFunctions:
         """Compiled basis, sample kernel and policies."""
         return ValueFunctions(self.problem, self.basis, compiled=self.model.compiled)
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of the generated code of f, g and σ: what every compiled function comes from."""
+        expressions = {
+            "f": self.problem.drift,
+            "g": self.problem.input_matrix,
+            "sigma": self.basis.sigma,
+        }
+        function = dense_function("fingerprint", {"zeta": self.problem.zeta}, expressions)
+        return hashlib.sha256(c_source(function).encode()).hexdigest()
 
     @cached_property
     def riccati_weights(self) -> Array:
