@@ -3,9 +3,9 @@
     python benchmarks/collocation.py
 
 The two-state game and the linear-quadratic game have closed-form values, exact for any horizon as the
-terminal cost is the value itself. The reference game starts from (2, -1, 1, .3, -.2, 1, 0, ...) with a
-horizon of 120 s; its reference value comes from the finest aligned mesh, and its drag |ν|ν is only C^1
-where a velocity changes sign.
+terminal cost is the value itself. The reference game starts from (2, -1, 1, .3, -.2, 1, 0, ...), where
+two velocities change sign, and from a fast state of the envelope, with a horizon of 120 s; its
+reference value comes from the finest aligned mesh. Drag |ν|ν is only C^1 where a velocity changes sign.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ def order(title: str, problem: Problem, zeta: np.ndarray, value: float, degree: 
     print(f"{title}, degree {degree}: {figures}  order {slope:.2f} (theory {2 * degree - 1})")
 
 
-def kinks() -> None:
+def kinks(title: str, zeta: np.ndarray) -> None:
     """Print the reference game's value error with and without points at the velocity sign changes."""
     problem = Scenario.load().station_keeping().problem
-    finest, _ = DirectSolver(problem, n_intervals=160).solve_aligned(REFERENCE_STATE)
-    print(f"\nreference game: V = {finest.value:.9f}")
+    finest, events = DirectSolver(problem, n_intervals=160).solve_aligned(zeta)
+    print(f"\n{title}: V = {finest.value:.9f}, {len(events)} velocity sign changes")
     print(f"{'intervals':>10}{'plain':>12}{'aligned':>12}{'costate plain':>15}{'costate aligned':>17}")
     for n_intervals in (15, 20, 30, 40, 60, 80):
         solver = DirectSolver(problem, n_intervals=n_intervals)
-        plain = solver.solve(REFERENCE_STATE, verify=False)
-        aligned, _ = solver.solve_aligned(REFERENCE_STATE)
+        plain = solver.solve(zeta, verify=False)
+        aligned, _ = solver.solve_aligned(zeta)
         values = [abs(s.value - finest.value) / finest.value for s in (plain, aligned)]
         norm = np.linalg.norm(finest.costate)
         costates = [np.linalg.norm(s.costate - finest.costate) / norm for s in (plain, aligned)]
@@ -65,7 +65,10 @@ def main() -> None:
     start = 0.5 * REFERENCE_STATE
     for degree in (2, 3):
         order("linear-quadratic game", linear, start, float(start @ linear.P @ start), degree)
-    kinks()
+    kinks("reference game", REFERENCE_STATE)
+    half_widths = Scenario.load().station_keeping().half_widths
+    fast = half_widths * np.random.default_rng(11).uniform(-1.0, 1.0, 12)
+    kinks("a fast state of the envelope (seed 11)", fast)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..comparison.compare import Comparison, compare
 from ..comparison.figures import draw_all
-from ..comparison.report import certificate, summary, verdict, write_report
+from ..comparison.report import certificate, summary, too_short, verdict, write_report
 from ..symbolic import InputError
 from .output import load_scenario, output_folder, print_json, print_table, progress
 
@@ -45,9 +45,12 @@ def _answer(comparison: Comparison, figures: dict[str, Path], report: Path) -> d
         "report": report,
         "faults": comparison.faults,
     }
+    notes = {}
     if comparison.regret is None:
-        answer["notes"] = {"regret": verdict(comparison)}
-    return answer
+        notes["regret"] = verdict(comparison)
+    elif comparison.too_short:
+        notes["regret"] = too_short(comparison)
+    return answer | {"notes": notes}
 
 
 def _commands(options: argparse.Namespace) -> list[str]:
@@ -64,6 +67,8 @@ def _print(comparison: Comparison, report: Path) -> None:
     print_table("Learned beside optimal", *summary(comparison))
     print_table("Certificate of the optimum", *certificate(comparison))
     print(verdict(comparison))
+    if comparison.regret is not None and comparison.too_short:
+        print(too_short(comparison))
     for fault in comparison.faults:
         print(f"did not converge: {fault}")
     print(f"report: {report}")

@@ -8,11 +8,16 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
 import logging
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 COMMANDS = {
     "generate": "write, compile and verify the model functions of a scenario",
@@ -32,6 +37,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # one BLAS thread: the matrices are small, and the numbers don't depend on the number of cores
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that does not know Greek shows '?'
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = parser().parse_args(_joined(given))
     handler = logging.StreamHandler()
@@ -39,9 +47,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logger = logging.getLogger("stationkeep")
     logger.addHandler(handler)
     try:
-        return _run(options)
+        with _remembered_interrupt() as interrupt:
+            code = _run(options)
+            if interrupt.is_set():  # CasADi swallows what is raised while it calls Python back
+                raise KeyboardInterrupt
+            return code
+    except KeyboardInterrupt:
+        print("stationkeep: interrupted; what was finished is kept", file=sys.stderr)
+        return 1
     finally:
         logger.removeHandler(handler)
+
+
+@contextmanager
+def _remembered_interrupt() -> Iterator[threading.Event]:
+    """Yield an event that is set when Ctrl-C is pressed, which raises KeyboardInterrupt as ever."""
+    pressed = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed
+        return
+
+    def press(number: int, frame: FrameType | None) -> None:
+        pressed.set()
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -59,9 +93,6 @@ def _run(options: argparse.Namespace) -> int:
         return 2
     except StationkeepError as error:
         print(f"stationkeep: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("stationkeep: interrupted; what was finished is kept", file=sys.stderr)
         return 1
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 from pathlib import Path
 from typing import Any
@@ -82,7 +83,7 @@ def _states(options: argparse.Namespace, scenario: Scenario) -> list[Array]:
     """Return the initial states of the command line, or the scenario's."""
     states = [require_state(_parse(text)) for text in options.state or []]
     if options.states is not None:
-        states += [require_state(row) for row in _read(options.states)]
+        states += _read(options.states)
     return states or [scenario.initial_state]
 
 
@@ -96,24 +97,33 @@ def _parse(text: str) -> list[float]:
         ) from None
 
 
-def _read(path: Path) -> Array:
+def _read(path: Path) -> list[Array]:
     """Read rows of 12 numbers from a .npy or CSV file."""
+    needed = "give rows of 12 numbers, as .npy or with commas between"
     try:
-        if path.suffix == ".npy":
-            rows = np.load(path, allow_pickle=False)
-        else:
-            rows = np.loadtxt(path, delimiter=",", ndmin=2)
+        table = np.load(path, allow_pickle=False) if path.suffix == ".npy" else _read_csv(path)
     except FileNotFoundError:
-        raise InputError(f"there is no file '{path}'; give a .npy or CSV file of states") from None
-    except (OSError, ValueError, EOFError) as error:
-        fault = str(error).partition("\n")[0]
-        raise InputError(
-            f"'{path}' can't be read as states ({fault}); give rows of 12 numbers as .npy or CSV"
-        ) from None
-    table = np.atleast_2d(rows)
-    if table.ndim != 2 or table.shape[1] != 12 or not len(table):
-        raise InputError(f"'{path}' holds an array of shape {rows.shape}, but rows of 12 are needed")
-    return np.asarray(table)
+        raise InputError(f"there is no file '{path}'; {needed}") from None
+    except IsADirectoryError:
+        raise InputError(f"'{path}' is a folder; {needed}") from None
+    except (OSError, ValueError, EOFError):
+        raise InputError(f"'{path}' can't be read as states; {needed}") from None
+    if table.ndim == 1:
+        table = table[None, :]
+    if table.dtype.kind not in "fiu" or table.ndim != 2 or table.shape[1] != 12 or not len(table):
+        raise InputError(f"'{path}' holds an array of shape {table.shape}; {needed}")
+    rows = []
+    for i, row in enumerate(table):
+        try:
+            rows.append(require_state(row))
+        except InputError as error:
+            raise InputError(f"'{path}', row {i + 1}: {error}") from None
+    return rows
+
+
+def _read_csv(path: Path) -> Array:
+    with path.open(encoding="utf-8", newline="") as file:
+        return np.array([[float(cell) for cell in row] for row in csv.reader(file) if row])
 
 
 def _write(path: Path, answer: dict[str, Any]) -> None:

@@ -18,6 +18,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ..comparison import Scenario
+from ..online.record import written_whole
 
 
 class Tell(Protocol):
@@ -29,14 +30,27 @@ class Tell(Protocol):
 
 
 def load_scenario(options: argparse.Namespace) -> Scenario:
-    """Return the scenario of the command line; raises InputError."""
-    return Scenario.load(options.scenario, options.overrides)
+    """Return the scenario of the command line, its vehicle and game checked; raises InputError."""
+    scenario = Scenario.load(options.scenario, options.overrides)
+    scenario.station_keeping()
+    scenario.initial_weights()
+    return scenario
 
 
 def output_folder(options: argparse.Namespace) -> Path:
-    """Return --out, or results/<scenario>."""
+    """Return --out, or results/<scenario>, once it is sure that files can be written there.
+
+    Raises
+    ------
+    InputError
+        If they can't.
+    """
     chosen: Path | None = options.out
-    return chosen if chosen is not None else Path("results") / Path(options.scenario).stem
+    folder = chosen if chosen is not None else Path("results") / Path(options.scenario).stem
+    with written_whole(folder / "probe") as probe:
+        probe.touch()
+    (folder / "probe").unlink(missing_ok=True)
+    return folder
 
 
 @contextmanager
@@ -49,7 +63,10 @@ def progress(options: argparse.Namespace) -> Iterator[Tell]:
         TimeElapsedColumn(),
     )
     console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=options.quiet, transient=True) as bar:
+    if not console.is_terminal or options.quiet:
+        yield _silent if options.quiet else _line_by_line()
+        return
+    with Progress(*columns, console=console, transient=True) as bar:
         tasks: dict[str, Any] = {}
 
         def tell(stage: str, part: float) -> None:
@@ -62,9 +79,25 @@ def progress(options: argparse.Namespace) -> Iterator[Tell]:
         yield tell
 
 
+def _silent(stage: str, part: float) -> None:
+    """Show nothing."""
+
+
+def _line_by_line() -> Tell:
+    """Return what shows each new stage as a line, where there is no terminal to draw on."""
+    seen: set[str] = set()
+
+    def tell(stage: str, part: float) -> None:
+        if stage not in seen:
+            seen.add(stage)
+            print(f"stationkeep: {stage} ...", file=sys.stderr, flush=True)
+
+    return tell
+
+
 def print_json(data: dict[str, Any]) -> None:
     """Print one JSON object; numbers that are not finite become null."""
-    print(json.dumps(plain(data), ensure_ascii=False))
+    print(json.dumps(plain(data)))
 
 
 def plain(value: Any) -> Any:

@@ -68,6 +68,11 @@ class Comparison:
     conditions: list[Condition]
 
     @property
+    def too_short(self) -> list[str]:
+        """Policies whose run ended with more than a thousandth of the cost still to come."""
+        return [name for name, metrics in self.metrics.items() if (metrics.rest_share or 0.0) > 1e-3]
+
+    @property
     def faults(self) -> list[str]:
         """What did not converge: runs that ended early and certificates that failed."""
         ended = [

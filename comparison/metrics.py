@@ -21,16 +21,18 @@ class RunMetrics:
     cost : integral of r of (5) in `game` mode, of ζ'Qζ + u_1'R u_1 in `disturbed` mode, plus
         ζ(T)'P ζ(T) for the rest; None if the run ended early
     regret : (cost - V*) / V*; None without an optimum or if the run ended early
-    position_rms : [m]
+    position_rms : [m]; None if the run ended before it began
     effort : integral of |τ_b force|^2 [N^2 s]
+    rest_share : part of the cost that is the estimate ζ(T)'P ζ(T)
     peak_thrust : largest share of a thruster's limit that the least-norm allocation asks for [-]
     stopped : why the run ended early, or None
     """
 
     cost: float | None
     regret: float | None
-    position_rms: float
+    position_rms: float | None
     effort: float
+    rest_share: float | None
     peak_thrust: float | None
     stopped: str | None
 
@@ -42,16 +44,18 @@ def run_metrics(record: xr.Dataset, station: StationKeeping, optimum: float | No
     """
     stopped = str(record.attrs["stopped"]) or None
     zeta, time = record["zeta"].values, record["time"].values
-    cost = None
+    cost = rest_share = None
     if stopped is None:
         rest = float(zeta[-1] @ station.problem.P @ zeta[-1])
         cost = float(cost_to_date(record)[-1]) + rest
+        rest_share = rest / cost if cost > 0.0 else 0.0
     tau_b = record["tau_b"].values
     return RunMetrics(
         cost=cost,
         regret=None if cost is None or optimum is None else (cost - optimum) / optimum,
-        position_rms=float(np.sqrt(np.mean(np.sum(zeta[:, :3] ** 2, axis=1)))),
+        position_rms=float(np.sqrt(np.mean(np.sum(zeta[:, :3] ** 2, axis=1)))) if len(time) else None,
         effort=float(np.trapezoid(np.sum(tau_b[:, :3] ** 2, axis=1), time)),
+        rest_share=rest_share,
         peak_thrust=peak_thrust(tau_b, station.model.vehicle),
         stopped=stopped,
     )
@@ -67,7 +71,7 @@ def cost_to_date(record: xr.Dataset) -> Array:
 
 def peak_thrust(tau_b: Array, vehicle: Vehicle) -> float | None:
     """Return the largest thrust over its limit, least-norm allocation; None without thrusters."""
-    if vehicle.thrusters is None:
+    if vehicle.thrusters is None or not len(tau_b):
         return None
     thrust = vehicle.thrusters.thrust(tau_b)
     reverse, forward = vehicle.thrusters.limits

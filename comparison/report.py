@@ -48,6 +48,7 @@ def write_report(
     body = [
         f"<h1>Station keeping of {escape(name)}: learned beside optimal</h1>",
         f'<p class="lead">{escape(verdict(comparison))}</p>',
+        *[f'<p class="fault">{escape(too_short(comparison))}</p>' for _ in comparison.too_short[:1]],
         *[f'<p class="fault">{escape(fault)}</p>' for fault in comparison.faults],
         _asked(comparison),
         "<h2>What came out</h2>",
@@ -83,6 +84,14 @@ def verdict(comparison: Comparison) -> str:
     return (
         f"The learned policy costs {100 * learned:.2f} % more than the optimum{states}; the linear "
         f"H-infinity policy, which learns nothing, {100 * linear:.2f} %: learning {outcome} the excess."
+    )
+
+
+def too_short(comparison: Comparison) -> str:
+    """Return a warning that some runs end while their cost still grows."""
+    return (
+        f"The runs are too short for a regret of {', '.join(comparison.too_short)}: more than 0.1 % of "
+        "the cost is the estimate ζ'P ζ for the rest; raise simulation.duration."
     )
 
 

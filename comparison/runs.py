@@ -33,6 +33,8 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
     text = scenario.model_dump_json(include=include)
     parts = [str(FORMAT), kind, text, vehicle.model_dump_json(), station.fingerprint]
     parts.append(repr(sorted(versions().items())))
+    start = scenario.initial_weights() if include is None else None
+    parts.append("" if start is None else start.tobytes().hex())
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     return {
         "kind": kind,

@@ -13,6 +13,7 @@ from pydantic import Field, PositiveFloat, PrivateAttr, model_validator
 
 from ..offline import OfflineSettings
 from ..online import LearnerSettings, SampleSettings, SimulationSettings, load_weights
+from ..online.closed_loop import STATE_NAMES
 from ..symbolic import (
     Basis,
     Game,
@@ -25,6 +26,7 @@ from ..symbolic import (
     find_function,
     require_state,
 )
+from ..symbolic.game import weight_matrix
 from ..symbolic.riccati import gamma_star
 from ..symbolic.settings import Settings, locate, read_toml, shipped_names, validate
 from ..symbolic.vehicle import Array, Vector3
@@ -119,7 +121,7 @@ class Scenario(Settings):
             _override(data, override)
         scenario = validate(cls, data, f"scenario '{name}'")
         scenario._folder = path.parent
-        require_state(scenario.simulation.initial_state)
+        scenario._require_start()
         return scenario
 
     @staticmethod
@@ -188,6 +190,22 @@ class Scenario(Settings):
         basis = Basis.build(self.basis.name, find_function(located), problem.zeta, half_widths)
         return StationKeeping(model, problem, basis, half_widths, self.envelope.scale * half_widths)
 
+    def _require_start(self) -> None:
+        state, simulation = require_state(self.simulation.initial_state), self.simulation
+        far = np.abs(state) / np.array(self.envelope.half_widths)
+        if far.max() > simulation.chi:
+            name = STATE_NAMES[int(far.argmax())]
+            raise InputError(
+                f"the initial state's {name} is {far.max():.2f} half-widths of the "
+                f"envelope, but a run ends beyond chi = {simulation.chi:g}; start closer or raise "
+                "simulation.chi"
+            )
+        if abs(np.degrees(state[4])) > simulation.pitch_limit:
+            raise InputError(
+                f"the initial state's pitch is {np.degrees(state[4]):.1f} deg, but a run ends beyond "
+                f"{simulation.pitch_limit:g} deg; start closer to level or raise simulation.pitch_limit"
+            )
+
     def _vehicle(self) -> Vehicle:
         named = "/" not in self.vehicle and not self.vehicle.endswith(".toml")
         return Vehicle.load(self.vehicle if named else self._path(self.vehicle))
@@ -195,7 +213,10 @@ class Scenario(Settings):
     def _problem(self, model: Model, half_widths: Array) -> Problem:
         settings = self.game
         W_d = settings.R if isinstance(settings.W_d, str) else settings.W_d
-        huge = Game(np.array(settings.Q), np.array(settings.R), np.array(W_d), np.inf)
+        weights = {"Q": settings.Q, "R": settings.R, "W_d": W_d}
+        huge = Game(
+            **{name: weight_matrix(name, value) for name, value in weights.items()}, gamma=np.inf
+        )
         problem = model.problem(huge, half_widths)
         try:
             return problem.with_game(Game(huge.Q, huge.R, huge.W_d, settings.gamma))
@@ -206,9 +227,10 @@ class Scenario(Settings):
     def _path(self, text: str) -> Path:
         """Resolve a path in the scenario: absolute, or relative to the working or its own folder."""
         path = Path(text).expanduser()
-        if not path.is_absolute() and not path.exists() and self._folder is not None:
-            return self._folder / path
-        return path
+        if path.is_absolute() or path.exists() or self._folder is None:
+            return path
+        beside = self._folder / path
+        return beside if beside.exists() else path
 
 
 def _override(data: dict[str, Any], text: str) -> None:

@@ -56,7 +56,7 @@ class DirectSolver:
     horizon : T [s]; after it the cost is ζ(T)'P ζ(T)
     n_intervals : K
     degree : d, Radau points an interval
-    grading : logarithm of the ratio of the last to the first interval
+    grading : about the logarithm of the ratio of the last to the first interval
     """
 
     def __init__(

@@ -10,12 +10,12 @@ from ..symbolic.vehicle import Array
 def graded_mesh(horizon: float, n_intervals: int, grading: float) -> Array:
     """Return mesh points t_i = T (e^{a i/K} - 1) / (e^a - 1), shape (K + 1,) [s].
 
-    `grading` a is the logarithm of the ratio of the last to the first interval; 0 is uniform.
+    `grading` a is about the logarithm of the ratio of the last to the first interval; 0 is uniform.
     """
     s = np.linspace(0.0, 1.0, n_intervals + 1)
     if grading == 0.0:
         return horizon * s
-    return np.asarray(horizon * np.expm1(grading * s) / np.expm1(grading))
+    return np.asarray(horizon * (np.expm1(grading * s) / np.expm1(grading)))
 
 
 def aligned_mesh(mesh: Array, events: Array, *, closest: float = 0.2) -> Array:
@@ -24,14 +24,14 @@ def aligned_mesh(mesh: Array, events: Array, *, closest: float = 0.2) -> Array:
     A mesh point nearer to an event than `closest` times the shorter of its intervals moves onto it;
     other events split their interval.
     """
-    points = list(mesh)
+    points, taken = list(mesh), set[float]()
     for event in np.sort(events):
         i = int(np.argmin(np.abs(np.array(points) - event)))
         neighbours = [abs(points[j] - points[i]) for j in (i - 1, i + 1) if 0 <= j < len(points)]
-        inner = 0 < i < len(points) - 1
+        inner = 0 < i < len(points) - 1 and points[i] not in taken
         if inner and abs(points[i] - event) < closest * min(neighbours):
             points[i] = float(event)
         elif points[0] < event < points[-1]:
-            points.append(float(event))
-            points.sort()
+            points = sorted({*points, float(event)})
+        taken.add(float(event))
     return np.array(points)

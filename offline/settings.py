@@ -17,7 +17,7 @@ class OfflineSettings(Settings):
     horizon : [s]; after it the cost is ζ(T)'P ζ(T)
     intervals : K, before the mesh is aligned with the velocity sign changes
     degree : Radau points an interval
-    grading : logarithm of the ratio of the last to the first interval; 0 is uniform
+    grading : about the logarithm of the ratio of the last to the first interval; 0 is uniform
     aligned : put mesh points where the velocities change sign
     value_tolerance : largest relative value error of a solve that counts as converged
     defect_tolerance : largest gap to the re-integrated trajectory, in half-widths

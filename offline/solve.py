@@ -24,8 +24,8 @@ class Certificate:
     value_error : relative; mesh refinement (K to 2K), re-integration and horizon together
     defect : largest gap of the re-integrated trajectory to the collocated one, in half-widths
     hji_residual : |H| of (7) at ζ with the costate, relative to ζ'Qζ
-    costate_error : costate against a central difference of the value along a random direction,
-        relative to the costate's norm in half-widths
+    costate_error : costate against a central difference of the value along a random direction, and
+        its change on a finer mesh, relative to the costate's norm in half-widths
     horizon_error : relative change of the value when the horizon is doubled
     """
 
@@ -118,21 +118,23 @@ class OfflineSolver:
                 mesh=aligned_mesh(solver.mesh, events),
                 guess=solution.trajectory,
                 verify=False,
-            ).value
+            )
             for solver in (self._finer, self._longer)
         )
-        refinement = abs(finer - solution.value) / value
+        refinement = abs(finer.value - solution.value) / value
         integration = abs(solution.reintegrated_value - solution.value) / value
-        horizon = abs(longer - finer) / value
+        horizon = abs(longer.value - finer.value) / value
         return Certificate(
             value_error=refinement + integration + horizon,
             defect=solution.defect,
             hji_residual=solution.hji_residual,
-            costate_error=self._costate_error(solution),
+            costate_error=self._costate_error(solution, longer),
             horizon_error=horizon,
         )
 
-    def _costate_error(self, solution: DirectSolution, step: float = 1e-3) -> float:
+    def _costate_error(
+        self, solution: DirectSolution, better: DirectSolution, step: float = 1e-3
+    ) -> float:
         """Compare λ'd with (V(ζ + h d) - V(ζ - h d)) / 2h, d a seeded direction in half-widths."""
         scale = self.problem.scale
         direction = np.random.default_rng(0).standard_normal(len(scale))
@@ -147,8 +149,11 @@ class OfflineSolver:
             for h in (step, -step)
         )
         difference = (ahead - behind) / (2.0 * step)
-        norm = max(float(np.linalg.norm(solution.costate * scale)), np.finfo(float).tiny)
-        return abs(float(solution.costate @ direction) - difference) / norm
+        # near the origin, relative to the gradient at the size of the difference step
+        least = 1e-3 * float(np.linalg.norm(2.0 * self.problem.P @ scale * scale))
+        norm = max(float(np.linalg.norm(solution.costate * scale)), least)
+        refinement = float(np.linalg.norm((better.costate - solution.costate) * scale))
+        return (abs(float(solution.costate @ direction) - difference) + refinement) / norm
 
     @cached_property
     def _finer(self) -> DirectSolver:
@@ -172,4 +177,4 @@ class OfflineSolver:
 
 def solve(problem: Problem, zeta0: Array, settings: OfflineSettings | None = None) -> OfflineSolution:
     """Return the certified optimum of a game from one state; see `OfflineSolver` for many."""
-    return OfflineSolver(problem, settings).solve(np.asarray(zeta0, dtype=float))
+    return OfflineSolver(problem, settings).solve(zeta0)

@@ -26,9 +26,9 @@ from ..symbolic.vehicle import Array
 class RadauRule:
     """Degree-d Radau rule on (0, 1].
 
-    nodes : (d,) collocation points, the last is 1
-    derivative : (d + 1, d) derivative at each node of the Lagrange polynomial of 0 and each node
-    weights : (d,) quadrature
+    Attributes
+    ----------
+    degree : d; the last of the d nodes is 1
     """
 
     degree: int
@@ -40,9 +40,10 @@ class RadauRule:
 
     @cached_property
     def coefficients(self) -> tuple[Array, Array]:
-        """Differentiation (d + 1, d) and quadrature (d,) of the rule."""
-        derivative, _, weights = casadi.collocation_coeff(list(self.nodes))
-        return np.array(derivative), np.array(weights).ravel()
+        """Derivative (d + 1, d) of the Lagrange polynomials of 0 and the nodes, and weights (d,)."""
+        derivative = np.array(casadi.collocation_coeff(list(self.nodes))[0])
+        # the weights are the integrals up to 1; CasADi's own are wrong for one point
+        return derivative, np.asarray(np.linalg.inv(derivative[1:])[:, -1], dtype=np.float64)
 
 
 class Transcription:

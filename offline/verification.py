@@ -54,17 +54,23 @@ def sign_changes(plant: Plant, path: Trajectory, *, smallest: float = 1e-4, poin
     values = np.array([plant.switching(state) for state in path.sample(times)[0]])
     events = []
     for column in range(values.shape[1]):
-        for i in _strong_crossings(values[:, column], smallest):
-            events.append(_root(plant, path, column, times[i], times[i + 1]))
+        for i, j in _strong_crossings(values[:, column], smallest):
+            events.append(_root(plant, path, column, times[i], times[j]))
     return np.sort(np.array(events))
 
 
-def _strong_crossings(values: Array, smallest: float) -> list[int]:
-    """Return i where values[i] and values[i+1] differ in sign and both lobes exceed `smallest`."""
-    crossings = np.flatnonzero(values[:-1] * values[1:] < 0.0)
-    edges = [0, *(crossings + 1), len(values)]
-    swings = [np.abs(values[a:b]).max() for a, b in pairwise(edges)]
-    return [int(c) for k, c in enumerate(crossings) if min(swings[k], swings[k + 1]) > smallest]
+def _strong_crossings(values: Array, smallest: float) -> list[tuple[int, int]]:
+    """Return pairs i < j of different sign, at most zeros between, both lobes over `smallest`."""
+    nonzero = np.flatnonzero(values)
+    signs = np.sign(values[nonzero])
+    crossings = np.flatnonzero(signs[:-1] != signs[1:])
+    edges = [0, *(crossings + 1), len(nonzero)]
+    swings = [np.abs(values[nonzero[a:b]]).max() for a, b in pairwise(edges) if b > a]
+    return [
+        (int(nonzero[c]), int(nonzero[c + 1]))
+        for k, c in enumerate(crossings)
+        if min(swings[k], swings[k + 1]) > smallest
+    ]
 
 
 def _root(plant: Plant, path: Trajectory, column: int, left: float, right: float) -> float:

@@ -112,13 +112,18 @@ class Controller:
         InputError
             If the measurement is not finite or of the wrong shape, or |pitch| >= 90 degrees.
         """
-        pose, rate = np.asarray(eta, dtype=float), np.asarray(eta_dot, dtype=float)
-        if not dt > 0.0:
+        try:
+            pose, rate = np.asarray(eta, dtype=float), np.asarray(eta_dot, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError("eta and eta_dot must be 6 numbers each") from None
+        if not (dt > 0.0 and np.isfinite(dt)):
             raise InputError(f"dt is {dt}, but must be a positive time in seconds")
         if pose.shape != (6,) or rate.shape != (6,):
             raise InputError(
                 f"eta and eta_dot must have 6 entries each, but have {pose.shape} and {rate.shape}"
             )
+        if not (np.all(np.isfinite(pose)) and np.all(np.isfinite(rate))):
+            raise InputError("eta and eta_dot must be finite, but contain NaN or infinity")
         self.zeta = require_state(self._error(pose, rate))
         self.last_step = None
         self._since += dt

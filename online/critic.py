@@ -90,7 +90,8 @@ class LeastSquares:
     so Ŵ_c minimises ∫ η e^{-β(t-s)} Σ w (r + ω'W)^2 ds + e^{-βt} (W - Ŵ_c(0))'Γ(0)^-1 (W - Ŵ_c(0)).
 
     The covariance is kept below Γ_max by the bounded-gain forgetting of Slotine and Li (1991, sec.
-    8.7.6): β is replaced by β (1 - λ_max(Γ) / Γ_max).
+    8.7.6): β is replaced by β (1 - λ_max(Γ) / Γ_max), and a late step forgets no more than the bound
+    leaves.
 
     Parameters
     ----------
@@ -116,8 +117,9 @@ class LeastSquares:
     def step(self, critic: Array, rows: NormalEquations, dt: float) -> Array:
         """Return Ŵ_c after dt with frozen rows, shape (m,), and update the covariance."""
         fraction = min(1.0, self.covariance_norm / self.covariance_bound)
-        rate = self.forgetting * (1.0 - fraction)
-        factor = -np.expm1(-rate * dt) / rate if rate > 0.0 else dt
-        self.information = np.exp(-rate * dt) * self.information + factor * rows.matrix
+        # a late step may not forget more than the bound leaves
+        decay = max(np.exp(-self.forgetting * (1.0 - fraction) * dt), fraction)
+        factor = -dt * (1.0 - decay) / np.log(decay) if decay < 1.0 else dt
+        self.information = decay * self.information + factor * rows.matrix
         factorized = scipy.linalg.cho_factor(self.information, lower=True)
         return np.asarray(critic - factor * scipy.linalg.cho_solve(factorized, rows.gradient))

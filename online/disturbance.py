@@ -44,7 +44,7 @@ class DisturbanceSource(Protocol):
 
 
 class Force:
-    """A constant or sinusoidal earth-frame force, amplitude · sin(2π f t), from `start` on."""
+    """A constant or sinusoidal force, amplitude · sin(2π f (t - start)), from `start` on."""
 
     def __init__(self, amplitude: Array, frequency: float, start: float) -> None:
         self.amplitude, self.frequency, self.start = amplitude, frequency, start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -9,7 +10,7 @@ import casadi
 import numpy as np
 from casadi import DM, SX
 
-from ..symbolic import StationKeeping
+from ..symbolic import RunError, StationKeeping
 from ..symbolic.dynamics import acceleration, earth_frame
 from ..symbolic.integration import integrate
 from ..symbolic.kernel import dense_function, export
@@ -73,12 +74,14 @@ class HeldPlant:
         RunError
             If the integration fails or becomes too stiff, or anything is not finite.
         """
+        if not (np.all(np.isfinite(tau_b)) and np.all(np.isfinite(tau_d))):
+            raise RunError(f"the wrench is not finite at t = {t:.2f} s")
         y = np.append(state.zeta, [state.cost, state.attenuated])
         edges = [t, *(b for b in self.source.breaks if t < b < t + dt), t + dt]
         absolute = self.tolerance * np.append(1e-2 * self.station.half_widths, [1e-2, 1e-2])
         for start, end in pairwise(edges):
             y = integrate(
-                lambda s, x: self.rates(s, x[:12], tau_b, tau_d)[0],
+                self._held(tau_b, tau_d, np.nextafter(end, start)),
                 y,
                 np.array([start, end]),
                 rtol=self.tolerance,
@@ -87,6 +90,10 @@ class HeldPlant:
                 max_calls=20_000,
             )[-1]
         return PlantState(y[:12], float(y[12]), float(y[13]))
+
+    def _held(self, tau_b: Array, tau_d: Array, last: float) -> Callable[[float, Array], Array]:
+        """Return the rates with wrenches held, up to the time `last` before the source breaks."""
+        return lambda t, y: self.rates(min(t, last), y[:12], tau_b, tau_d)[0]
 
 
 def _held_rates(station: StationKeeping) -> casadi.Function:

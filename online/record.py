@@ -19,6 +19,11 @@ from ..symbolic.vehicle import Array
 from .closed_loop import STATE_NAMES, History
 
 FORCE_NAMES = ("X", "Y", "Z", "K", "M", "N")
+OVER_TIME = ("time", "zeta", "tau_b", "u_control", "disturbance", "cost", "attenuated")
+OVER_LEARNING = (
+    *("learn_time", "bellman_error", "sample_error", "rank_margin", "projecting"),
+    *("critic", "actor_1", "actor_2"),
+)
 _STATE_UNITS = "m, rad, m/s, rad/s"
 _FORCE_UNITS = "N, N m"
 
@@ -33,27 +38,36 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     over_time, over_learning = ("time",), ("learn_time",)
     weights = ("learn_time", "basis")
 
-    def stack(rows: list[Array], width: int) -> Array:
-        return np.array(rows).reshape(len(rows), width)
+    # an interrupt may have come between two appends
+    n_time = min(len(getattr(history, name)) for name in OVER_TIME)
+    n_learn = min(len(getattr(history, name)) for name in OVER_LEARNING)
+
+    def stack(name: str, width: int) -> Array:
+        n = n_time if name in OVER_TIME else n_learn
+        return np.array(getattr(history, name)[:n]).reshape(n, width)
+
+    def series(name: str) -> Array:
+        n = n_time if name in OVER_TIME else n_learn
+        return np.array(getattr(history, name)[:n], dtype=float)
 
     variables = {
-        "zeta": ((*over_time, "state"), stack(history.zeta, 12), _STATE_UNITS),
-        "tau_b": ((*over_time, "force"), stack(history.tau_b, 6), _FORCE_UNITS),
-        "u_control": ((*over_time, "force"), stack(history.u_control, 6), _FORCE_UNITS),
-        "u_disturbance": ((*over_time, "force"), stack(history.disturbance, 6), _FORCE_UNITS),
-        "cost": (over_time, np.array(history.cost), "cost"),
-        "attenuated": (over_time, np.array(history.attenuated), "cost"),
-        "bellman_error": (over_learning, np.array(history.bellman_error), "cost/s"),
-        "sample_error": (over_learning, np.array(history.sample_error), "1"),
-        "rank_margin": (over_learning, np.array(history.rank_margin), "1"),
-        "projecting": (over_learning, np.array(history.projecting, dtype=np.int8), "1"),
-        "critic": (weights, stack(history.critic, m), "cost"),
-        "actor_1": (weights, stack(history.actor_1, m), "cost"),
-        "actor_2": (weights, stack(history.actor_2, m), "cost"),
+        "zeta": ((*over_time, "state"), stack("zeta", 12), _STATE_UNITS),
+        "tau_b": ((*over_time, "force"), stack("tau_b", 6), _FORCE_UNITS),
+        "u_control": ((*over_time, "force"), stack("u_control", 6), _FORCE_UNITS),
+        "u_disturbance": ((*over_time, "force"), stack("disturbance", 6), _FORCE_UNITS),
+        "cost": (over_time, series("cost"), "cost"),
+        "attenuated": (over_time, series("attenuated"), "cost"),
+        "bellman_error": (over_learning, series("bellman_error"), "cost/s"),
+        "sample_error": (over_learning, series("sample_error"), "1"),
+        "rank_margin": (over_learning, series("rank_margin"), "1"),
+        "projecting": (over_learning, series("projecting").astype(np.int8), "1"),
+        "critic": (weights, stack("critic", m), "cost"),
+        "actor_1": (weights, stack("actor_1", m), "cost"),
+        "actor_2": (weights, stack("actor_2", m), "cost"),
     }
     coordinates = {
-        "time": ("time", np.array(history.time), {"units": "s"}),
-        "learn_time": ("learn_time", np.array(history.learn_time), {"units": "s"}),
+        "time": ("time", series("time"), {"units": "s"}),
+        "learn_time": ("learn_time", series("learn_time"), {"units": "s"}),
         "state": list(STATE_NAMES),
         "force": list(FORCE_NAMES),
     }
@@ -76,8 +90,9 @@ def save(dataset: xr.Dataset, path: Path) -> Path:
     InputError
         If the folder can't be written.
     """
+    content = dataset.to_netcdf(engine="h5netcdf")  # in memory: HDF5 does not survive a full disk
     with written_whole(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+        temporary.write_bytes(content)
     return path
 
 
@@ -94,10 +109,9 @@ def load(path: Path) -> xr.Dataset:
     try:
         with xr.open_dataset(path, engine="h5netcdf") as dataset:
             return dataset.load()
-    except (OSError, ValueError, KeyError) as error:
-        fault = str(error).partition("\n")[0]
+    except (OSError, ValueError, KeyError, RuntimeError):
         raise InputError(
-            f"'{path}' can't be read as a record ({fault}); it may be truncated, run again"
+            f"'{path}' can't be read as a record; it may be truncated, make it again"
         ) from None
 
 
@@ -112,7 +126,10 @@ def load_weights(path: Path) -> Array:
     dataset = load(path)
     if "critic" not in dataset or dataset.sizes.get("learn_time", 0) == 0:
         raise InputError(f"'{path}' holds no learned weights; give the record of an online run")
-    return np.asarray(dataset["critic"].values[-1], dtype=np.float64)
+    weights = np.asarray(dataset["critic"].values[-1], dtype=np.float64)
+    if not np.all(np.isfinite(weights)):
+        raise InputError(f"the last weights of '{path}' are not finite; give the record of another run")
+    return weights
 
 
 @contextmanager

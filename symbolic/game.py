@@ -27,7 +27,14 @@ from .errors import GammaTooSmallError, InputError
 from .vehicle import Array
 
 
-def _weight(name: str, value: ArrayLike) -> Array:
+def weight_matrix(name: str, value: ArrayLike) -> Array:
+    """Return a weight of (5) as a matrix; a one-dimensional `value` is its diagonal.
+
+    Raises
+    ------
+    InputError
+        If it is not a finite symmetric positive definite matrix; `name` appears in the message.
+    """
     try:
         matrix = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -81,7 +88,7 @@ class Game:
 
     def __post_init__(self) -> None:
         for name in ("Q", "R", "W_d"):
-            object.__setattr__(self, name, _weight(name, getattr(self, name)))
+            object.__setattr__(self, name, weight_matrix(name, getattr(self, name)))
         if self.R.shape != self.W_d.shape:
             raise InputError(
                 f"R is {self.R.shape} but W_d is {self.W_d.shape}; they must have the same shape"

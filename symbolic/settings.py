@@ -105,7 +105,13 @@ def _sentence(model: type[BaseModel], error: ValidationError) -> str:
         return f"'{key}': {message}" if key else message
     kinds = {"list_type": "an array", "tuple_type": "an array", "model_type": "a table"}
     kinds |= {"float_type": "a number", "float_parsing": "a number"}
+    kinds |= {"int_type": "an integer", "int_parsing": "an integer", "int_from_float": "an integer"}
+    kinds |= {"bool_type": "true or false", "bool_parsing": "true or false"}
     requirement = str(fault["msg"]).replace("Input should be", "it must be")
+    if fault["type"] in ("too_short", "too_long"):
+        context = fault["ctx"]
+        n = context.get("min_length", context.get("max_length"))
+        requirement = f"it must have {n} entries, not {context['actual_length']}"
     if fault["type"] in kinds:
         requirement = f"it must be {kinds[fault['type']]}"
     return f"'{key}' is {_shown(given)}, but {requirement}; correct it"

@@ -53,7 +53,7 @@ class ValueFunctions:
 
     @cached_property
     def policies(self) -> Kernel:
-        """û_1 (11) and û_2 (12) from zeta, actor_1 (m,) and actor_2 (m,)."""
+        """û_1 (14) and û_2 (15) from zeta, actor_1 (m,) and actor_2 (m,)."""
         zeta, m, game = self.problem.zeta, self.basis.n_basis, self.problem.game
         weights = {"actor_1": SX.sym("actor_1", m), "actor_2": SX.sym("actor_2", m)}
         # σ'W as the gradient of W'σ: one reverse sweep instead of m rows

@@ -1,0 +1,213 @@
+"""Figures of merit against independent computations: regret, dissipation, quadrature, thrust."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from casadi import collocation_points
+from scipy.integrate import quad, trapezoid
+from stationkeep.comparison.metrics import (
+    cost_to_date,
+    dissipation_margin,
+    distribution,
+    peak_thrust,
+    run_metrics,
+)
+from stationkeep.comparison.policies import LinearPolicy
+from stationkeep.comparison.runs import online_record, optimal_record
+from stationkeep.offline import OfflineSolver, Trajectory
+from stationkeep.symbolic import Vehicle
+
+from .games import Array, quick_scenario
+
+FROM_REST = "simulation.initial_state=[0,0,0,0,0,0,0,0,0,0,0,0]"
+DISTURBED = ("simulation.mode=disturbed", "simulation.disturbance.kind=constant")
+PUSH = "simulation.disturbance.force=[2,-1,1,0.05,-0.05,0.1]"
+
+
+@cache
+def optimum() -> xr.Dataset:
+    scenario = quick_scenario("offline.horizon=40", "offline.intervals=12", "offline.aligned=false")
+    solver = OfflineSolver(scenario.station_keeping().problem, scenario.offline)
+    return optimal_record(scenario, solver)
+
+
+@cache
+def disturbed() -> xr.Dataset:
+    """Return a run from rest under a constant force."""
+    return online_record(quick_scenario(FROM_REST, *DISTURBED, PUSH, "simulation.duration=3"))
+
+
+@cache
+def learned() -> xr.Dataset:
+    return online_record(quick_scenario())
+
+
+def test_distribution_of_finished_runs() -> None:
+    answer = distribution([0.4, 0.1, 0.3, 0.2, 0.5])
+    assert answer["median"] == pytest.approx(0.3)
+    assert answer["p90"] == pytest.approx(0.46)  # 0.4 + 0.6 (0.5 - 0.4), between the 4th and 5th
+    assert answer["max"] == pytest.approx(0.5)
+    assert answer["diverged"] == 0
+
+
+@pytest.mark.parametrize(
+    ("regrets", "median", "diverged"),
+    [
+        ([0.1, None, 0.3], 0.2, 1),
+        ([None, None, 0.7], 0.7, 2),
+        ([None, None], None, 2),
+        ([], None, 0),
+        ([0.0, 0.0], 0.0, 0),
+    ],
+)
+def test_distribution_counts_the_runs_that_diverged(
+    regrets: list[float | None], median: float | None, diverged: int
+) -> None:
+    answer: dict[str, Any] = distribution(regrets)
+    assert answer["diverged"] == diverged
+    assert answer["median"] == (None if median is None else pytest.approx(median))
+    assert (answer["max"] is None) == (median is None)
+
+
+def test_the_optimum_has_no_regret_against_itself() -> None:
+    """Its cost in the game, by its own quadrature and with ζ(T)'P ζ(T), is its value."""
+    record = optimum()
+    P = quick_scenario().station_keeping().problem.P
+    end = record["zeta"].values[-1]
+    value = record.attrs["value"]
+    assert (record["cost"].values[-1] + end @ P @ end - value) / value == pytest.approx(0.0, abs=1e-8)
+
+
+def test_the_optimum_is_the_cheapest() -> None:
+    """The linear policy from the same state, run long enough, costs more than the optimum."""
+    scenario = quick_scenario("simulation.duration=40")
+    station = scenario.station_keeping()
+    value = optimum().attrs["value"]
+    run = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
+    metrics = run_metrics(run, station, value)
+    assert metrics.stopped is None
+    assert metrics.regret is not None
+    assert 0.009 < metrics.regret < 0.011
+    assert metrics.cost == pytest.approx((1.0 + metrics.regret) * value)
+
+
+def test_cost_is_the_integral_of_the_local_cost() -> None:
+    """ζ'Qζ + u_1'R u_1 - γ^2 u_2'W_d u_2 by the trapezoidal rule, holds of 0.02 s."""
+    record, game = learned(), quick_scenario().station_keeping().game
+    zeta, u_control = record["zeta"].values, record["u_control"].values
+    local = game.local_cost(zeta, u_control, record["u_disturbance"].values)
+    expected = trapezoid(local, record["time"].values)
+    assert cost_to_date(record)[-1] == pytest.approx(expected, rel=0.02)
+    assert np.all(np.diff(record["cost"].values) > 0.0)
+
+
+def test_cost_of_a_disturbed_run_has_no_credit_for_the_disturbance() -> None:
+    record = disturbed()
+    np.testing.assert_array_equal(cost_to_date(record), record["cost"].values)
+    assert record["attenuated"].values[-1] > 0.0
+    assert cost_to_date(learned())[-1] < learned()["cost"].values[-1]
+
+
+def test_a_run_that_ended_early_has_no_cost() -> None:
+    record = learned().assign_attrs(stopped="the state left chi at t = 2.00 s")
+    metrics = run_metrics(record, quick_scenario().station_keeping(), 100.0)
+    assert metrics.cost is None
+    assert metrics.regret is None
+    assert metrics.stopped == "the state left chi at t = 2.00 s"
+    assert np.isfinite(metrics.position_rms)
+
+
+def test_dissipation_from_rest() -> None:
+    """From V(0) = 0 the L2 gain is below γ: what is spent and stored is less than γ^2 ∫ d'W_d d."""
+    record, station = disturbed(), quick_scenario().station_keeping()
+    assert record.attrs["stopped"] == ""
+    margin = dissipation_margin(record, station, 0.0)
+    assert margin > 0.0
+    game, P = station.game, station.problem.P
+    zeta, u, d = (record[name].values for name in ("zeta", "u_control", "u_disturbance"))
+    spent = np.sum((zeta @ game.Q) * zeta, axis=1) + np.sum((u @ game.R) * u, axis=1)
+    supplied = game.gamma**2 * np.sum((d @ game.W_d) * d, axis=1)
+    expected = trapezoid(supplied - spent, record["time"].values) - zeta[-1] @ P @ zeta[-1]
+    assert margin == pytest.approx(expected, rel=0.02)
+    assert np.abs(zeta[-1]).max() > 0.01, "the force must have moved the vehicle"
+
+
+def test_dissipation_from_a_state() -> None:
+    """With the certified value of the start the gain of the linear policy holds too."""
+    force = "simulation.disturbance.force=[1,0,0,0,0,0]"
+    scenario = quick_scenario(*DISTURBED, force, "simulation.duration=10")
+    station = scenario.station_keeping()
+    record = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
+    start = float(optimum().attrs["value"])
+    margin = dissipation_margin(record, station, start)
+    assert margin > 0.0
+    assert dissipation_margin(record, station, start + 1.0) - margin == pytest.approx(1.0)
+    assert record["attenuated"].values[-1] == pytest.approx(40.0)  # γ^2 d^2 T = 4 · 1 N^2 · 10 s
+
+
+def test_the_disturbance_of_a_constant_force_is_that_force() -> None:
+    """d of the record is J^-T τ_d in the earth frame: what was set, at every time."""
+    force = np.array([2, -1, 1, 0.05, -0.05, 0.1])
+    np.testing.assert_allclose(disturbed()["u_disturbance"].values, np.tile(force, (151, 1)), atol=1e-9)
+
+
+def radau_trajectory(mesh: Array, degree: int) -> Trajectory:
+    nodes = np.array(collocation_points(degree, "radau"))
+    times = np.append(mesh[0], (mesh[:-1, None] + np.diff(mesh)[:, None] * nodes).ravel())
+    n_points = len(times) - 1
+    return Trajectory(mesh, times, np.zeros((n_points + 1, 1)), np.zeros((n_points, 1)), degree)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 5, 7])
+def test_quadrature_of_polynomials_is_exact(degree: int) -> None:
+    mesh = np.array([0.0, 0.3, 1.0, 2.5])
+    path = radau_trajectory(mesh, degree)
+    coefficients = np.random.default_rng(degree).standard_normal(degree)
+    exact = np.polyint(coefficients)
+    got = path.quadrature(np.polyval(coefficients, path.times[1:]))
+    expected = np.polyval(exact, path.times) - np.polyval(exact, 0.0)
+    np.testing.assert_allclose(got, expected, atol=1e-12)
+
+
+def test_quadrature_of_a_smooth_function_against_scipy() -> None:
+    def wave(t: float) -> float:
+        return float(np.exp(-0.3 * t) * np.cos(2.0 * t) + 0.1 * t)
+
+    path = radau_trajectory(np.linspace(0.0, 6.0, 25), 5)
+    got = path.quadrature(np.array([wave(t) for t in path.times[1:]]))
+    for i in (0, 1, 37, 80, 120):
+        expected, _ = quad(wave, 0.0, path.times[i], epsabs=1e-13, epsrel=1e-13)
+        assert got[i] == pytest.approx(expected, abs=1e-7)
+
+
+def test_quadrature_at_mesh_points_has_the_higher_order() -> None:
+    """Radau quadrature of degree d integrates polynomials of degree 2d - 2 exactly over intervals."""
+    path = radau_trajectory(np.array([0.0, 0.7, 2.0]), 3)
+    got = path.quadrature(path.times[1:] ** 4)[[3, 6]]
+    np.testing.assert_allclose(got, np.array([0.7, 2.0]) ** 5 / 5.0, rtol=1e-12)
+
+
+def test_peak_thrust() -> None:
+    vehicle = Vehicle.load("bluerov2-heavy")
+    assert vehicle.thrusters is not None
+    heave = np.zeros((3, 6))
+    heave[:, 2] = [10.0, -103.0, 0.0]  # four vertical thrusters share it: 25.75 N each, forward
+    assert peak_thrust(heave, vehicle) == pytest.approx(25.75 / 51.5)
+    heave[1, 2] = 103.0  # and 25.75 N each in reverse, of 39.9 N
+    assert peak_thrust(heave, vehicle) == pytest.approx(25.75 / 39.9)
+    assert peak_thrust(heave, Vehicle.load("rexrov")) is None
+
+
+def test_position_and_effort() -> None:
+    record = learned()
+    metrics = run_metrics(record, quick_scenario().station_keeping(), None)
+    distance = np.linalg.norm(record["zeta"].values[:, :3], axis=1)
+    assert metrics.position_rms == pytest.approx(np.sqrt(np.mean(distance**2)))
+    force = np.linalg.norm(record["tau_b"].values[:, :3], axis=1)
+    assert metrics.effort == pytest.approx(trapezoid(force**2, record["time"].values))
+    assert metrics.regret is None
