@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import asdict
 
 from ..comparison import check
-from .output import load_scenario, print_json, print_table, progress
+from ..online.record import write_text
+from .output import load_scenario, output_folder, plain, print_json, print_table, progress
 
 
 def run(options: argparse.Namespace) -> int:
@@ -15,8 +17,11 @@ def run(options: argparse.Namespace) -> int:
     with progress(options) as tell:
         tell("conditions", 0.0)
         conditions = check(scenario)
+    answer = {"conditions": [asdict(condition) for condition in conditions]}
+    if options.out is not None:
+        write_text(output_folder(options) / "conditions.json", json.dumps(plain(answer), indent=1))
     if options.json:
-        print_json({"conditions": [asdict(condition) for condition in conditions]})
+        print_json(answer)
         return 0
     words = {True: "yes", False: "no", None: "not known"}
     print_table(

@@ -5,10 +5,12 @@ from __future__ import annotations
 import argparse
 import time
 from dataclasses import asdict
+from pathlib import Path
 
+from ..online.record import write_text
 from ..symbolic import Export, Model, ValueFunctions
 from ..symbolic.compilation import cache_folder
-from .output import load_scenario, print_json, print_table, progress
+from .output import load_scenario, output_folder, print_json, print_table, progress
 
 
 def run(options: argparse.Namespace) -> int:
@@ -25,6 +27,8 @@ def run(options: argparse.Namespace) -> int:
         for described in (*model.exports(), *functions.exports(n_samples)):
             exports.append(described)
             tell("functions", len(exports) / 11)
+    if options.out is not None:
+        _copy_sources(exports, output_folder(options))
     seconds = time.perf_counter() - started
     cache_hit = all(described.cache_hit for described in exports)
     if options.json:
@@ -49,3 +53,11 @@ def run(options: argparse.Namespace) -> int:
     )
     print(f"{seconds:.1f} s; cache: {cache_folder()}")
     return 0
+
+
+def _copy_sources(exports: list[Export], folder: Path) -> None:
+    """Write the C code of every compiled function to `folder`."""
+    for described in exports:
+        if described.key is not None:
+            source = cache_folder() / described.key / "function.c"
+            write_text(folder / f"{described.name}.c", source.read_text(encoding="utf-8"))

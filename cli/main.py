@@ -11,13 +11,12 @@ import importlib
 import io
 import logging
 import os
-import signal
 import sys
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
-from types import FrameType
+
+from . import interrupt
 
 COMMANDS = {
     "generate": "write, compile and verify the model functions of a scenario",
@@ -47,35 +46,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logger = logging.getLogger("stationkeep")
     logger.addHandler(handler)
     try:
-        with _remembered_interrupt() as interrupt:
-            code = _run(options)
-            if interrupt.is_set():  # CasADi swallows what is raised while it calls Python back
-                raise KeyboardInterrupt
-            return code
+        with interrupt.remembered():
+            return _run(options)
     except KeyboardInterrupt:
         print("stationkeep: interrupted; what was finished is kept", file=sys.stderr)
         return 1
     finally:
         logger.removeHandler(handler)
-
-
-@contextmanager
-def _remembered_interrupt() -> Iterator[threading.Event]:
-    """Yield an event that is set when Ctrl-C is pressed, which raises KeyboardInterrupt as ever."""
-    pressed = threading.Event()
-    if threading.current_thread() is not threading.main_thread():
-        yield pressed
-        return
-
-    def press(number: int, frame: FrameType | None) -> None:
-        pressed.set()
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, press)
-    try:
-        yield pressed
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -103,6 +80,18 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f"stationkeep: {message}; see '{self.prog} --help'\n")
 
 
+class _Version(argparse.Action):
+    """Print the installed version; looked up only when it is asked for."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, help: str | None = None) -> None:
+        super().__init__(option_strings, dest, nargs=0, help=help)
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print and exit."""
+        print(f"stationkeep {version('stationkeep')}")
+        parser.exit()
+
+
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the whole command line."""
     top = _Parser(
@@ -110,6 +99,7 @@ def parser() -> argparse.ArgumentParser:
         description="Station keeping of underwater vehicles by an online-learned H-infinity policy, "
         "beside the certified optimum of the same game.",
     )
+    top.add_argument("--version", action=_Version, help="print the version and exit")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, purpose in COMMANDS.items():
         command = commands.add_parser(
@@ -150,7 +140,9 @@ def _common_options(command: argparse.ArgumentParser) -> None:
         default=DEFAULT_SCENARIO,
         help=f"a shipped name or the path of a TOML file (default: {DEFAULT_SCENARIO})",
     )
-    command.add_argument("--out", type=Path, metavar="DIR", help="folder of the results")
+    command.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder of the results (default: results/SCENARIO)"
+    )
     command.add_argument(
         "--set",
         dest="overrides",

@@ -6,6 +6,7 @@ import argparse
 import json
 import math
 import sys
+import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +19,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ..comparison import Scenario
-from ..online.record import written_whole
+from ..symbolic import InputError
+from . import interrupt
 
 
 class Tell(Protocol):
@@ -34,6 +36,7 @@ def load_scenario(options: argparse.Namespace) -> Scenario:
     scenario = Scenario.load(options.scenario, options.overrides)
     scenario.station_keeping()
     scenario.initial_weights()
+    interrupt.check()
     return scenario
 
 
@@ -47,15 +50,22 @@ def output_folder(options: argparse.Namespace) -> Path:
     """
     chosen: Path | None = options.out
     folder = chosen if chosen is not None else Path("results") / Path(options.scenario).stem
-    with written_whole(folder / "probe") as probe:
-        probe.touch()
-    (folder / "probe").unlink(missing_ok=True)
-    return folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        raise InputError(
+            f"the folder '{folder}' can't be written ({error.strerror}); choose another one with --out"
+        ) from None
 
 
 @contextmanager
 def progress(options: argparse.Namespace) -> Iterator[Tell]:
-    """Yield a function that shows the present stage on stderr; silent with --quiet."""
+    """Yield a function that shows the present stage on stderr; silent with --quiet.
+
+    It is also where a Ctrl-C that got lost is noticed.
+    """
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -70,6 +80,7 @@ def progress(options: argparse.Namespace) -> Iterator[Tell]:
         tasks: dict[str, Any] = {}
 
         def tell(stage: str, part: float) -> None:
+            interrupt.check()
             if stage not in tasks:
                 for task in tasks.values():
                     bar.update(task, completed=1.0)
@@ -81,6 +92,7 @@ def progress(options: argparse.Namespace) -> Iterator[Tell]:
 
 def _silent(stage: str, part: float) -> None:
     """Show nothing."""
+    interrupt.check()
 
 
 def _line_by_line() -> Tell:
@@ -88,6 +100,7 @@ def _line_by_line() -> Tell:
     seen: set[str] = set()
 
     def tell(stage: str, part: float) -> None:
+        interrupt.check()
         if stage not in seen:
             seen.add(stage)
             print(f"stationkeep: {stage} ...", file=sys.stderr, flush=True)

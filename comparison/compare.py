@@ -24,7 +24,7 @@ Stage = Callable[[str, float], None]
 
 # Benchmark cases beside the scenario's own learner: what the paper's plain choices make of it.
 CASES: dict[str, dict[str, dict[str, Any]]] = {
-    "quadratic basis": {"basis": {"name": "quadratic"}},
+    "quadratic basis": {"basis": {"name": "quadratic"}, "learner": {"weights": "riccati"}},
     "gradient law": {
         "learner": {
             "rule": "gradient",

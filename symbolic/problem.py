@@ -49,8 +49,8 @@ class Problem:
             raise InputError(f"{self.name}: f must be ({n},) and g must have {n} rows")
         if self.game.Q.shape != (n, n) or self.game.R.shape != (k, k):
             raise InputError(
-                f"{self.name}: Q is {self.game.Q.shape} and R is {self.game.R.shape}, but "
-                f"{n} states and {k} inputs need {(n, n)} and {(k, k)}"
+                f"{self.name}: Q has {len(self.game.Q)} rows and R has {len(self.game.R)}, but {n} "
+                f"states and {k} inputs need {n} and {k}; give one weight for each"
             )
         if self.scale.shape != (n,) or not np.all(np.isfinite(self.scale) & (self.scale > 0.0)):
             raise InputError(f"{self.name}: the scale must be {n} positive half-widths")

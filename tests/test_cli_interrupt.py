@@ -55,7 +55,7 @@ def interrupted(
 def test_ctrl_c_during_online(user_folder: Path) -> None:
     answer = interrupted(
         "online", "--json", "--quiet", "--out", "out", *LONG,
-        cwd=user_folder, ready=lambda: True, after=4.0,
+        cwd=user_folder, ready=lambda: True, after=3.0,
     )  # fmt: skip
     assert answer.code == 1
     assert answer.out == ""

