@@ -15,7 +15,6 @@ from ..online.record import written_whole
 
 LEARNED, OPTIMAL, LINEAR = "#c1440e", "#12436d", "#8a8a8a"
 PALETTE = ("#12436d", "#c1440e", "#28a197", "#801650", "#f2a541", "#6c6c6c")
-ANGLES = {"phi": "roll φ", "theta": "pitch θ", "psi": "yaw ψ"}
 
 _LOOK = {
     "axes.grid": True,

@@ -2,6 +2,7 @@
 
 from .direct import DirectSolution, DirectSolver
 from .plant import Plant
+from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings
 from .solve import Certificate, OfflineSolution, OfflineSolver, solve
 from .trajectory import Trajectory
@@ -14,6 +15,8 @@ __all__ = [
     "OfflineSolution",
     "OfflineSolver",
     "Plant",
+    "SaddleSolution",
+    "SaddleSolver",
     "Trajectory",
     "solve",
 ]

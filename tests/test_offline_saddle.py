@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stationkeep.offline import DirectSolver
-from stationkeep.offline.saddle import SaddleSolver
+from stationkeep.offline import DirectSolver, SaddleSolver
 from stationkeep.symbolic import InputError, Problem, RunError, closed_form_problem
 
 from .games import FAR_STATE, FAR_VALUE, FAST_STATE, FAST_VALUE
