@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import asdict
 
 from ..comparison import check
-from ..online.record import write_text
-from .output import load_scenario, output_folder, plain, print_json, print_table, progress
+from .output import load_scenario, output_folder, print_json, print_table, progress, write_json
 
 
 def run(options: argparse.Namespace) -> int:
@@ -19,7 +17,7 @@ def run(options: argparse.Namespace) -> int:
         conditions = check(scenario)
     answer = {"conditions": [asdict(condition) for condition in conditions]}
     if options.out is not None:
-        write_text(output_folder(options) / "conditions.json", json.dumps(plain(answer), indent=1))
+        write_json(output_folder(options) / "conditions.json", answer)
     if options.json:
         print_json(answer)
         return 0

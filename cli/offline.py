@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,9 @@ import numpy as np
 from ..comparison import Scenario
 from ..comparison.runs import optimal_record
 from ..offline import OfflineSolver
-from ..online.record import write_text
 from ..symbolic import InputError, RunError, require_state
 from ..symbolic.vehicle import Array
-from .output import load_scenario, output_folder, plain, print_json, print_table, progress
+from .output import load_scenario, output_folder, print_json, print_table, progress, write_json
 
 CERTIFICATE = ("value_error", "defect", "hji_residual", "costate_error", "horizon_error")
 
@@ -35,7 +33,7 @@ def run(options: argparse.Namespace) -> int:
             rows.append(_solve(scenario, solver, folder, zeta0, i))
     linear = {"P": station.problem.P, "gamma_star": station.problem.gamma_star}
     answer = {"states": rows, "linear": linear}
-    _write(folder / "offline.json", answer)
+    write_json(folder / "offline.json", answer)
     if options.json:
         print_json(answer)
     else:
@@ -124,11 +122,6 @@ def _read(path: Path) -> list[Array]:
 def _read_csv(path: Path) -> Array:
     with path.open(encoding="utf-8", newline="") as file:
         return np.array([[float(cell) for cell in row] for row in csv.reader(file) if row])
-
-
-def _write(path: Path, answer: dict[str, Any]) -> None:
-
-    write_text(path, json.dumps(plain(answer), indent=1))
 
 
 def _print(rows: list[dict[str, Any]], gamma_star: float, folder: Path) -> None:

@@ -19,6 +19,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ..comparison import Scenario
+from ..online.record import write_text
 from ..symbolic import InputError
 from . import interrupt
 
@@ -111,6 +112,11 @@ def _line_by_line() -> Tell:
 def print_json(data: dict[str, Any]) -> None:
     """Print one JSON object; numbers that are not finite become null."""
     print(json.dumps(plain(data)))
+
+
+def write_json(path: Path, data: dict[str, Any]) -> None:
+    """Write what `print_json` prints to a file, indented; raises as `written_whole`."""
+    write_text(path, json.dumps(plain(data), indent=1))
 
 
 def plain(value: Any) -> Any:
