@@ -1,19 +1,30 @@
-"""The direct solve: collocation and IPOPT from a given initial state, checked by re-integration."""
+"""The direct solve of the single-player equivalent from a given initial state, on a given mesh.
+
+Collocation and IPOPT, or the structured Newton method on the same discrete problem where the plant is
+fully actuated; IPOPT also takes over where Newton's method does not converge.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from ..symbolic import Problem, RunError, require_state
 from ..symbolic.vehicle import Array
+from .guess import LinearStart
 from .mesh import aligned_mesh, graded_mesh
+from .newton import StructuredNewton
 from .plant import Plant
+from .stages import Grid
 from .trajectory import Trajectory
 from .transcription import Transcription
 from .verification import reintegrate, sign_changes
+
+Method = Literal["newton", "ipopt"]
 
 
 @dataclass(frozen=True)
@@ -30,8 +41,13 @@ class DirectSolution:
     defect : largest gap between collocated and re-integrated mesh states, in half-widths
     reintegrated_value : the value along the re-integrated trajectory
     hji_residual : |H| of (7) at ζ with the costate, relative to ζ'Qζ
-    iterations : of IPOPT, all rounds of mesh alignment together
-    seconds : wall time of IPOPT and its starting guess, likewise
+    second_order : whether the reduced Hessian is positive definite, a strict local minimum
+    curvature : (K, d, k) accelerations that do not raise the cost to second order, where Newton's
+        method found them; else None
+    hessian : (n, n) second derivative of V, where Newton's method found it; else None
+    method : "newton" or "ipopt", what solved it
+    iterations : all rounds of mesh alignment together
+    seconds : wall time of solver and starting guess, likewise
     """
 
     zeta: Array
@@ -43,6 +59,10 @@ class DirectSolution:
     defect: float
     reintegrated_value: float
     hji_residual: float
+    second_order: bool
+    curvature: Array | None
+    hessian: Array | None
+    method: Method
     iterations: int
     seconds: float
 
@@ -57,6 +77,8 @@ class DirectSolver:
     n_intervals : K
     degree : d, Radau points an interval
     grading : about the logarithm of the ratio of the last to the first interval
+    method : "newton" where the plant has inverse dynamics, otherwise and as a safety net IPOPT; or
+        "ipopt" always
     """
 
     def __init__(
@@ -67,11 +89,15 @@ class DirectSolver:
         n_intervals: int = 40,
         degree: int = 5,
         grading: float = 5.0,
+        method: Method = "newton",
     ) -> None:
         self.problem = problem
         self.degree = degree
         self.plant = Plant(problem)
         self.mesh = graded_mesh(horizon, n_intervals, grading)
+        usable = method == "newton" and problem.inverse_dynamics is not None
+        self._newton = StructuredNewton(problem) if usable else None
+        self._start = LinearStart(problem)
         self._programs: dict[int, Transcription] = {}
 
     def solve(
@@ -96,27 +122,18 @@ class DirectSolver:
         zeta0 = require_state(zeta0, self.problem.n_states)
         mesh = self.mesh if mesh is None else mesh
         started = time.perf_counter()
-        program = self._program(len(mesh) - 1)
-        times = program.times(mesh)
-        first = self._linear_guess(program, zeta0, times) if guess is None else guess.sample(times)
-        answer = program.solver(
-            x0=program.pack(zeta0, *first),
-            p=np.concatenate([zeta0, np.diff(mesh)]),
-            lbg=0.0,
-            ubg=0.0,
-        )
-        statistics = program.solver.stats()
-        if not statistics["success"]:
-            raise RunError(
-                f"IPOPT stopped with '{statistics['return_status']}' after "
-                f"{statistics['iter_count']} iterations from {np.array2string(zeta0, precision=3)}"
-            )
-        states, v = program.unpack(np.array(answer["x"]).ravel())
-        path = Trajectory(mesh, np.append(mesh[0], times), states, v, self.degree)
-        costate = -np.array(answer["lam_g"]).ravel()[: self.problem.n_states]
-        seconds = time.perf_counter() - started
-        iterations = int(statistics["iter_count"])
-        return self._checked(zeta0, float(answer["f"]), costate, path, iterations, seconds, verify)
+        found = None
+        if self._newton is not None:
+            # what is not a minimum, or not found, is IPOPT's
+            with contextlib.suppress(RunError):
+                found = self._by_newton(self._newton, zeta0, mesh, guess)
+        if found is None:
+            found = self._by_ipopt(zeta0, mesh, guess)
+        found = replace(found, seconds=time.perf_counter() - started)
+        if not verify:
+            return found
+        defect, value = reintegrate(self.plant, zeta0, found.trajectory)
+        return replace(found, defect=defect, reintegrated_value=value)
 
     def solve_aligned(
         self, zeta0: Array, *, tolerance: float = 1e-6, rounds: int = 6
@@ -148,35 +165,76 @@ class DirectSolver:
         )
         return checked, known
 
-    def _linear_guess(self, program: Transcription, zeta0: Array, times: Array) -> tuple[Array, Array]:
-        """Simulate the linear H-infinity policy; beyond a failure, decay to rest."""
-        policy = self.plant.linear_policy
-        grid = np.append(0.0, times)
-        try:
-            states, _ = self.plant.simulate(
-                zeta0, lambda t, zeta: policy(zeta), grid, tolerance=1e-6, restart=False
+    def _by_newton(
+        self, newton: StructuredNewton, zeta0: Array, mesh: Array, guess: Trajectory | None
+    ) -> DirectSolution:
+        grid = Grid(mesh, self.degree, self.problem.n_inputs)
+        if guess is None:
+            start = newton.linear_guess(zeta0, grid)
+        else:
+            start = guess.accelerations(grid.times).reshape(grid.K, grid.degree, grid.k)
+        found = newton.solve(zeta0, grid, start)
+        path = Trajectory(mesh, np.append(mesh[0], grid.times), found.states, found.v, self.degree)
+        return self._solution(
+            path,
+            value=found.value,
+            costate=found.costate,
+            second_order=found.curvature is None,
+            curvature=found.curvature,
+            hessian=found.hessian,
+            method="newton",
+            iterations=found.iterations,
+        )
+
+    def _by_ipopt(self, zeta0: Array, mesh: Array, guess: Trajectory | None) -> DirectSolution:
+        program = self._program(len(mesh) - 1)
+        times = program.times(mesh)
+        first = self._start.sample(zeta0, times)[:2] if guess is None else guess.sample(times)
+        answer = program.solver(
+            x0=program.pack(zeta0, *first),
+            p=np.concatenate([zeta0, np.diff(mesh)]),
+            lbg=0.0,
+            ubg=0.0,
+        )
+        statistics = program.solver.stats()
+        if not statistics["success"]:
+            raise RunError(
+                f"IPOPT stopped with '{statistics['return_status']}' after "
+                f"{statistics['iter_count']} iterations from {np.array2string(zeta0, precision=3)}"
             )
-        except RunError:
-            states = zeta0 * np.exp(-grid)[:, None]
-        return states[1:], np.array([policy(state) for state in states[1:]])
+        states, v = program.unpack(np.array(answer["x"]).ravel())
+        path = Trajectory(mesh, np.append(mesh[0], times), states, v, self.degree)
+        # IPOPT adds to the Hessian whenever the inertia is not that of a strict minimum
+        added = statistics["iterations"]["regularization_size"]
+        return self._solution(
+            path,
+            value=float(answer["f"]),
+            costate=-np.array(answer["lam_g"]).ravel()[: self.problem.n_states],
+            second_order=not added or added[-1] == 0.0,
+            curvature=None,
+            hessian=None,
+            method="ipopt",
+            iterations=int(statistics["iter_count"]),
+        )
 
     def _program(self, n_intervals: int) -> Transcription:
         if n_intervals not in self._programs:
             self._programs[n_intervals] = Transcription(self.problem, n_intervals, self.degree)
         return self._programs[n_intervals]
 
-    def _checked(
+    def _solution(
         self,
-        zeta0: Array,
+        path: Trajectory,
+        *,
         value: float,
         costate: Array,
-        path: Trajectory,
+        second_order: bool,
+        curvature: Array | None,
+        hessian: Array | None,
+        method: Method,
         iterations: int,
-        seconds: float,
-        verify: bool,
     ) -> DirectSolution:
-        defect, reintegrated = reintegrate(self.plant, zeta0, path) if verify else (np.nan, np.nan)
-        game = self.problem.game
+        game, zeta0 = self.problem.game, path.states[0]
         f, g = self.plant.terms(zeta0)
         u_control, u_disturbance = game.policies(g, costate)
         state_cost = max(float(zeta0 @ game.Q @ zeta0), np.finfo(float).tiny)
@@ -187,9 +245,13 @@ class DirectSolver:
             u_control=u_control,
             u_disturbance=u_disturbance,
             trajectory=path,
-            defect=defect,
-            reintegrated_value=reintegrated,
+            defect=np.nan,
+            reintegrated_value=np.nan,
             hji_residual=abs(game.stationary_hamiltonian(zeta0, f, g, costate)) / state_cost,
+            second_order=second_order,
+            curvature=curvature,
+            hessian=hessian,
+            method=method,
             iterations=iterations,
-            seconds=seconds,
+            seconds=np.nan,
         )

@@ -23,7 +23,7 @@ from casadi import DM, MX, SX
 from ..symbolic import Problem, RunError, require_state
 from ..symbolic.vehicle import Array
 from .mesh import graded_mesh
-from .transcription import RadauRule
+from .radau import RadauRule
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ are parameters, so a mesh of as many intervals reuses the program.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi
@@ -20,30 +19,7 @@ from casadi import DM, MX, SX
 
 from ..symbolic import Problem
 from ..symbolic.vehicle import Array
-
-
-@dataclass(frozen=True, eq=False)
-class RadauRule:
-    """Degree-d Radau rule on (0, 1].
-
-    Attributes
-    ----------
-    degree : d; the last of the d nodes is 1
-    """
-
-    degree: int
-
-    @cached_property
-    def nodes(self) -> Array:
-        """Collocation points, shape (d,)."""
-        return np.array(casadi.collocation_points(self.degree, "radau"))
-
-    @cached_property
-    def coefficients(self) -> tuple[Array, Array]:
-        """Derivative (d + 1, d) of the Lagrange polynomials of 0 and the nodes, and weights (d,)."""
-        derivative = np.array(casadi.collocation_coeff(list(self.nodes))[0])
-        # the weights are the integrals up to 1; CasADi's own are wrong for one point
-        return derivative, np.asarray(np.linalg.inv(derivative[1:])[:, -1], dtype=np.float64)
+from .radau import RadauRule
 
 
 class Transcription:

@@ -5,7 +5,7 @@ from .errors import GammaTooSmallError, InputError, RunError, StationkeepError
 from .game import Game
 from .kernel import Export, Kernel
 from .model import Model, require_state
-from .problem import Problem, closed_form_problem
+from .problem import InverseDynamics, Problem, closed_form_problem
 from .riccati import game_riccati, gamma_star
 from .station import StationKeeping
 from .value import PointTerms, ValueFunctions
@@ -17,6 +17,7 @@ __all__ = [
     "Game",
     "GammaTooSmallError",
     "InputError",
+    "InverseDynamics",
     "Kernel",
     "Model",
     "PointTerms",

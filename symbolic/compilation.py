@@ -92,8 +92,10 @@ def c_source(function: casadi.Function) -> str:
     return str(generator.dump())
 
 
-def compile_function(function: casadi.Function) -> Library:
+def compile_function(function: casadi.Function, wrapper: str = "") -> Library:
     """Return the compiled library of a function, from the cache or newly built.
+
+    `wrapper` is C code that is appended to the generated code and may call it.
 
     Raises
     ------
@@ -103,7 +105,7 @@ def compile_function(function: casadi.Function) -> Library:
     compiler = find_compiler()
     if compiler is None:
         raise CompilationError("no C compiler was found (cc, gcc, clang)")
-    source = c_source(function)
+    source = c_source(function) + wrapper
     key = _key(source, compiler)
     entry = cache_folder() / key
     if _is_whole(entry):

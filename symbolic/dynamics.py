@@ -93,6 +93,19 @@ def acceleration(
     """
     eta, eta_dot = zeta[:6], zeta[6:]
     nu = kinematics.jacobian_inverse(eta) @ eta_dot
+    total = tau_b + wrench(vehicle, zeta, water_velocity, water_acceleration)
+    M_inverse = DM(np.linalg.inv(vehicle.M))
+    J_dot = kinematics.jacobian_dot(eta, eta_dot)
+    return kinematics.jacobian(eta) @ (M_inverse @ total) + J_dot @ nu
+
+
+def wrench(vehicle: Vehicle, zeta: SX, water_velocity: SX, water_acceleration: SX) -> SX:
+    """Return what acts on the vehicle without its actuators: M ν_dot at τ_b = 0, shape (6,).
+
+    Parameters as for `acceleration`.
+    """
+    eta = zeta[:6]
+    nu = kinematics.jacobian_inverse(eta) @ zeta[6:]
     to_body = kinematics.rotation(eta).T
     v_c, a_c = to_body @ water_velocity, to_body @ water_acceleration
     nu_r = nu - casadi.vertcat(v_c, SX(3, 1))
@@ -101,18 +114,14 @@ def acceleration(
     froude_krylov = casadi.vertcat(
         displaced_force, casadi.cross(DM(vehicle.center_of_buoyancy), displaced_force)
     )
-    wrench = (
-        tau_b
-        + froude_krylov
+    return (
+        froude_krylov
         - restoring(vehicle, eta)
         - coriolis(vehicle.rigid_body_inertia, nu) @ nu
         - coriolis(vehicle.M_added, nu_r) @ nu_r
         - damping(vehicle, nu_r) @ nu_r
         + DM(vehicle.M_added) @ nu_c_dot
     )
-    M_inverse = DM(np.linalg.inv(vehicle.M))
-    J_dot = kinematics.jacobian_dot(eta, eta_dot)
-    return kinematics.jacobian(eta) @ (M_inverse @ wrench) + J_dot @ nu
 
 
 def drift(vehicle: Vehicle, zeta: SX, current: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> SX:
@@ -129,6 +138,21 @@ def input_matrix(vehicle: Vehicle, zeta: SX) -> SX:
     """Return g(ζ) = (0, M_bar^-1) of (3) with M_bar^-1 = J M^-1 J', shape (12, 6)."""
     J = kinematics.jacobian(zeta[:6])
     return casadi.vertcat(SX(6, 6), J @ DM(np.linalg.inv(vehicle.M)) @ J.T)
+
+
+def inverse_dynamics(
+    vehicle: Vehicle, zeta: SX, eta_ddot: SX, current: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> SX:
+    """Return the earth-frame force u that gives η_ddot in a known steady current, shape (6,).
+
+    u = J^-T (M ν_dot - w) with ν_dot = J^-1 (η_ddot - J_dot ν) and w of `wrench`: (2) solved for the
+    force, so that f(ζ) + g(ζ) u = (η_dot, η_ddot).
+    """
+    J_inv = kinematics.jacobian_inverse(zeta[:6])
+    nu = J_inv @ zeta[6:]
+    nu_dot = J_inv @ (eta_ddot - kinematics.jacobian_dot(zeta[:6], zeta[6:]) @ nu)
+    still = wrench(vehicle, zeta, SX(DM(current)), SX(3, 1))
+    return J_inv.T @ (DM(vehicle.M) @ nu_dot - still)
 
 
 def relative_velocity(zeta: SX, current: tuple[float, float, float]) -> SX:

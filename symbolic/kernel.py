@@ -101,7 +101,7 @@ def export(
             kernel, key, hit = external, library.key, library.cache_hit
         except CompilationError as error:
             difference = 0.0
-            _say_once(f"{error}; using CasADi's virtual machine, about 10 times slower")
+            say_once(f"{error}; using CasADi's virtual machine, about 10 times slower")
     described = Export(
         name=function.name(),
         inputs=[_describe(function.name_in(i), function.size_in(i)) for i in range(function.n_in())],
@@ -147,7 +147,8 @@ def dense_function(name: str, inputs: dict[str, SX], outputs: dict[str, SX]) -> 
 _said: set[str] = set()
 
 
-def _say_once(message: str) -> None:
+def say_once(message: str) -> None:
+    """Log a warning the first time it is given."""
     if message not in _said:
         _said.add(message)
         logger.warning(message)

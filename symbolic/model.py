@@ -14,7 +14,7 @@ from . import dynamics, kinematics
 from .errors import InputError
 from .game import Game
 from .kernel import Export, Kernel, dense_function, export
-from .problem import Problem
+from .problem import InverseDynamics, Problem
 from .vehicle import Array, Vector3, Vehicle
 
 PITCH_LIMIT = np.pi / 2  # rad; J is singular there (Assumption 1)
@@ -85,8 +85,11 @@ class Model:
         """
         g = dynamics.input_matrix(self.vehicle, self.zeta)
         f = dynamics.drift(self.vehicle, self.zeta, self.current)
+        a = SX.sym("acceleration", 6)
+        v = dynamics.inverse_dynamics(self.vehicle, self.zeta, a, self.current)
         if np.any(self.u_trim):
             f = f + g @ DM(self.u_trim)
+            v = v - DM(self.u_trim)
         return Problem(
             name=self.vehicle.name,
             zeta=self.zeta,
@@ -95,6 +98,7 @@ class Model:
             game=game,
             scale=scale,
             switching=dynamics.relative_velocity(self.zeta, self.current),
+            inverse_dynamics=InverseDynamics(a, v),
         )
 
     @cached_property

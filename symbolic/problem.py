@@ -16,6 +16,20 @@ from .vehicle import Array
 
 
 @dataclass(frozen=True, eq=False)
+class InverseDynamics:
+    """The input that gives a fully actuated plant a wanted acceleration.
+
+    Attributes
+    ----------
+    acceleration : (k,) symbol a = η_ddot
+    v : (k,) expression of ζ = (η, η_dot) and a with f(ζ) + g(ζ) v = (η_dot, a)
+    """
+
+    acceleration: SX
+    v: SX
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
     """ζ_dot = f(ζ) + g(ζ) (u_1 + u_2) with f(0) = 0, and the game played on it.
 
@@ -28,11 +42,13 @@ class Problem:
     game : the weights
     scale : (n,) half-widths of the envelope, the unit of the scaled state x = ζ / scale
     switching : (s,) expressions of `zeta`; f is only C^1 where one of them changes sign
+    inverse_dynamics : for ζ = (η, η_dot) with as many inputs as η has entries; None if there is none
 
     Raises
     ------
     InputError
-        If the shapes disagree, f(0) is not 0 or the scale is not positive.
+        If the shapes disagree, f(0) is not 0, the scale is not positive, or the inverse dynamics
+        contradict f and g.
     """
 
     name: str
@@ -42,6 +58,7 @@ class Problem:
     game: Game
     scale: Array
     switching: SX = field(default_factory=lambda: SX(0, 1))
+    inverse_dynamics: InverseDynamics | None = None
 
     def __post_init__(self) -> None:
         n, k = self.n_states, self.n_inputs
@@ -60,6 +77,8 @@ class Problem:
                 f"{self.name}: f(0) must be 0, but its largest entry is {residual:.3g}; "
                 "take the steady trim out first"
             )
+        if self.inverse_dynamics is not None:
+            self._require_inverse(self.inverse_dynamics)
 
     @property
     def n_states(self) -> int:
@@ -97,6 +116,7 @@ class Problem:
             drift=DM(A) @ self.zeta,
             input_matrix=SX(DM(B)),
             switching=SX(0, 1),
+            inverse_dynamics=self._linear_inverse(A, B),
         )
 
     def with_game(self, game: Game) -> Problem:
@@ -110,6 +130,35 @@ class Problem:
             return self.with_game(Game(old.Q, old.R, old.W_d, gamma))
         except GammaTooSmallError as error:
             raise GammaTooSmallError(gamma, error.threshold, self.gamma_star) from None
+
+    def _linear_inverse(self, A: Array, B: Array) -> InverseDynamics | None:
+        """v = B_2^-1 (a - A_2 ζ) from the lower rows of A and B."""
+        if self.inverse_dynamics is None:
+            return None
+        a, k = self.inverse_dynamics.acceleration, self.n_inputs
+        inverse = np.linalg.inv(B[k:])
+        return InverseDynamics(a, DM(inverse) @ (a - DM(A[k:]) @ self.zeta))
+
+    def _require_inverse(self, inverse: InverseDynamics) -> None:
+        """Compare f + g v with (η_dot, a) at seeded points of the scale."""
+        n, k = self.n_states, self.n_inputs
+        if n != 2 * k:
+            raise InputError(f"{self.name}: inverse dynamics need 2 k states, but {n} is not 2 x {k}")
+        wanted = casadi.vertcat(self.zeta[k:], inverse.acceleration)
+        residual = casadi.Function(
+            "residual",
+            [self.zeta, inverse.acceleration],
+            [self.drift + self.input_matrix @ inverse.v - wanted],
+        )
+        rng = np.random.default_rng(0)
+        points = [
+            residual(rng.uniform(-0.5, 0.5, n) * self.scale, rng.uniform(-1, 1, k)) for _ in "abc"
+        ]
+        worst = max(float(np.abs(np.array(DM(point))).max()) for point in points)
+        if not worst < 1e-9:
+            raise InputError(
+                f"{self.name}: the inverse dynamics contradict f and g by {worst:.2g}; correct them"
+            )
 
     def _at_origin(self, expression: SX) -> Array:
         value = casadi.Function("at_origin", [self.zeta], [expression])(np.zeros(self.n_states))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from stationkeep.offline import DirectSolution, DirectSolver, Trajectory
-from stationkeep.offline.transcription import RadauRule, Transcription
+from stationkeep.offline.radau import RadauRule
+from stationkeep.offline.transcription import Transcription
 from stationkeep.symbolic import Problem
 
 from .games import FAR_STATE, HALF_WIDTHS, Array, linear_quadratic, two_state
