@@ -1,29 +1,28 @@
 """The saddle point itself: Pontryagin's state-costate boundary value problem, both players unknown.
 
-    ζ_dot = f + g (u_1 + u_2),   λ_dot = -∂H/∂ζ,   ∂H/∂u_1 = 0,   ∂H/∂u_2 = 0,
-    ζ(0) = ζ_0,   λ(T) = 2 P ζ(T), the stable manifold of the linearised game,
-
-with H = ζ'Qζ + u_1'R u_1 - γ^2 u_2'W_d u_2 + λ'(f + g (u_1 + u_2)) of (6). Unknowns at every Radau
-point are ζ, λ, u_1 and u_2. Nothing is minimised and R_eff is not used: this solution shares neither
-unknowns nor derivatives of the model with the direct one, so their disagreement is evidence. A sparse
-Newton method solves the square system, started from the linearised game and, where that does not
-converge, by continuation in the initial state.
+Nothing is minimised, and the equations (`boundary.py`) don't know R_eff: this solution shares neither
+unknowns nor derivatives of the model nor collocation with the direct one, so their disagreement is
+evidence. Newton's method starts at rest, from where its first step is the linearised game, and goes
+on by continuation in the initial state where that does not converge; the first Newton step after
+each change of ζ_0 is then the Euler predictor along the path of solutions.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import copy
+import time
+from dataclasses import dataclass, replace
 
-import casadi
 import numpy as np
-import scipy.linalg
-import scipy.sparse.linalg
-from casadi import DM, MX, SX
 
 from ..symbolic import Problem, RunError, require_state
 from ..symbolic.vehicle import Array
-from .mesh import graded_mesh
-from .radau import RadauRule
+from .boundary import BoundaryProblem, Unknowns
+from .extremal_field import ExtremalField
+from .gauss import GaussRule, interpolate
+from .mesh import aligned_mesh, graded_mesh
+from .plant import Plant
+from .verification import sign_changes
 
 
 @dataclass(frozen=True)
@@ -35,21 +34,48 @@ class SaddleSolution:
     zeta : (n,) initial state
     value : integral of r of (5), with ζ(T)'P ζ(T) as the rest
     costate : (n,) λ(0), the gradient of V
-    u_control, u_disturbance : (K d, k) both players at the Radau points
-    times : (K d + 1,) [s], 0 first
-    states, costates : (K d + 1, n)
-    iterations : Newton steps, those of all continuation steps together
+    slope : dV/dγ = -2 γ times the integral of u_2'W_d u_2, by the envelope theorem; 0 for infinite γ
+    mesh : (K + 1,) interval ends [s]
+    times : (K (d + 1) + 1,) mesh and Gauss points [s], ascending
+    states, costates : (K (d + 1) + 1, n) there
+    u_control, u_disturbance : (K d, k) both players at the Gauss points
+    iterations : Newton steps, those of continuation and alignment too
+    seconds : wall time, likewise
     """
 
     zeta: Array
     value: float
     costate: Array
-    u_control: Array
-    u_disturbance: Array
+    slope: float
+    mesh: Array
     times: Array
     states: Array
     costates: Array
+    u_control: Array
+    u_disturbance: Array
     iterations: int
+    seconds: float
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        """Return states and costates, each (len, n), at given times, by the polynomials."""
+        return self._sampled(self._points, times, self.states[:-1], self.costates[:-1])
+
+    def sample_players(self, times: Array) -> tuple[Array, Array]:
+        """Return u_1 and u_2, each (len, k), likewise."""
+        return self._sampled(self._points[1:], times, self.u_control, self.u_disturbance)
+
+    @property
+    def _points(self) -> Array:
+        """The start and the Gauss points of an interval, in (0, 1)."""
+        n_points = (len(self.times) - 1) // (len(self.mesh) - 1)
+        first = self.times[:n_points]
+        return np.asarray((first - self.mesh[0]) / (self.mesh[1] - self.mesh[0]))
+
+    def _sampled(self, points: Array, times: Array, first: Array, second: Array) -> tuple[Array, Array]:
+        width = first.shape[1]
+        both = np.hstack([first, second]).reshape(len(self.mesh) - 1, len(points), 2 * width)
+        sampled = interpolate(points, self.mesh, both, times)
+        return sampled[:, :width], sampled[:, width:]
 
 
 class SaddleSolver:
@@ -57,9 +83,10 @@ class SaddleSolver:
 
     Parameters
     ----------
-    problem : the game on its plant, γ finite
+    problem : the game on its plant; γ may be infinite
     horizon : T [s]
-    n_intervals, degree, grading : of the Radau mesh, as for the direct solver
+    n_intervals, degree, grading : of the Gauss collocation; not those of the direct solver
+    compiled : False uses CasADi's virtual machine even where a C compiler exists
     """
 
     def __init__(
@@ -67,17 +94,35 @@ class SaddleSolver:
         problem: Problem,
         *,
         horizon: float = 120.0,
-        n_intervals: int = 40,
-        degree: int = 5,
-        grading: float = 5.0,
+        n_intervals: int = 30,
+        degree: int = 6,
+        grading: float = 6.0,
+        compiled: bool = True,
     ) -> None:
         self.problem = problem
-        self.rule = RadauRule(degree)
+        self.rule = GaussRule(degree)
         self.mesh = graded_mesh(horizon, n_intervals, grading)
-        self._systems: dict[int, casadi.Function] = {}
+        self.plant = Plant(problem)
+        self._field = ExtremalField(problem, compiled=compiled)
+        self._boundary = BoundaryProblem(problem, self._field, self.rule)
 
-    def solve(self, zeta0: Array, *, mesh: Array | None = None) -> SaddleSolution:
-        """Return the saddle point from `zeta0`, on `mesh` if it is given.
+    def with_gamma(self, gamma: float) -> SaddleSolver:
+        """Return the solver of the same problem at another γ; it shares the compiled functions.
+
+        Raises
+        ------
+        GammaTooSmallError
+            If γ does not exceed the threshold of R_eff > 0.
+        """
+        other = copy.copy(self)
+        other.problem = self.problem.with_gamma(gamma)
+        other._boundary = BoundaryProblem(other.problem, self._field, self.rule)
+        return other
+
+    def solve(
+        self, zeta0: Array, *, mesh: Array | None = None, start: SaddleSolution | None = None
+    ) -> SaddleSolution:
+        """Return the saddle point from `zeta0`, on `mesh` if it is given, first tried from `start`.
 
         Raises
         ------
@@ -88,12 +133,48 @@ class SaddleSolver:
         """
         zeta0 = require_state(zeta0, self.problem.n_states)
         mesh = self.mesh if mesh is None else mesh
-        unknowns = self._linear_start(zeta0, mesh)
+        started, iterations = time.perf_counter(), 0
+        unknowns = None
+        if start is not None:
+            unknowns, iterations = self._newton(self._guess(start, mesh), zeta0, mesh)
+        if unknowns is None:
+            unknowns, count = self._continued(zeta0, mesh)
+            iterations += count
+        return self._solution(unknowns, zeta0, mesh, iterations, time.perf_counter() - started)
+
+    def solve_aligned(
+        self,
+        zeta0: Array,
+        *,
+        start: SaddleSolution | None = None,
+        tolerance: float = 1e-6,
+        rounds: int = 6,
+    ) -> tuple[SaddleSolution, Array]:
+        """Return the saddle point on a mesh aligned with the velocity sign changes, and their times.
+
+        The sign changes are those of its own trajectory: solve, locate them, put mesh points on them,
+        and repeat until they move by less than `tolerance` [s]. Raises as `solve`.
+        """
+        solution = self.solve(zeta0, start=start)
+        iterations, seconds = solution.iterations, solution.seconds
+        known = np.empty(0)
+        for _ in range(rounds):
+            events = sign_changes(self.plant, solution)
+            if len(events) == len(known) and np.abs(events - known).max(initial=0.0) <= tolerance:
+                break
+            known = events
+            solution = self.solve(zeta0, mesh=aligned_mesh(self.mesh, events), start=solution)
+            iterations += solution.iterations
+            seconds += solution.seconds
+        return replace(solution, iterations=iterations, seconds=seconds), known
+
+    def _continued(self, zeta0: Array, mesh: Array) -> tuple[Unknowns, int]:
+        """Follow the solution from rest to `zeta0`, in one step if it can be."""
+        unknowns = self._boundary.at_rest(len(mesh) - 1)
         reached, step, iterations = 0.0, 1.0, 0
         while reached < 1.0:
             part = min(1.0, reached + step)
-            guess = unknowns * (part / reached if reached > 0.0 else part)
-            found, count = self._newton(guess, part * zeta0, mesh)
+            found, count = self._newton(unknowns, part * zeta0, mesh)
             iterations += count
             if found is not None:
                 unknowns, reached, step = found, part, 2.0 * step
@@ -104,117 +185,63 @@ class SaddleSolver:
                     f"no saddle point was found beyond {reached:.1%} of the way to "
                     f"{np.array2string(zeta0, precision=3)}"
                 )
-        return self._unpack(unknowns, zeta0, mesh, iterations)
+        return unknowns, iterations
 
     def _newton(
-        self, unknowns: Array, zeta0: Array, mesh: Array, limit: int = 20
-    ) -> tuple[Array | None, int]:
+        self, unknowns: Unknowns, zeta0: Array, mesh: Array, limit: int = 20
+    ) -> tuple[Unknowns | None, int]:
         """Return the root, or None where Newton's method does not converge, and its iterations."""
-        system = self._system(len(mesh) - 1)
+        lengths = np.diff(mesh)
         for iteration in range(1, limit + 1):
-            residual, matrix = system(unknowns, zeta0, np.diff(mesh))
             try:
-                factors = scipy.sparse.linalg.splu(matrix.sparse())
-            except (RuntimeError, ValueError):  # singular, or not finite
+                # a step too far, to where the model is singular, shows in its size
+                with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                    step = self._boundary.newton_step(unknowns, zeta0, lengths)
+                    unknowns = unknowns.plus(step)
+                    size = self._boundary.size(step)
+            except np.linalg.LinAlgError:
                 return None, iteration
-            step = factors.solve(-np.array(residual).ravel())
-            unknowns = unknowns + step
-            size = np.abs(unknowns).max()
-            if not np.isfinite(size) or size > 1e9:
+            if not size < 1e3:
                 return None, iteration
-            if np.abs(step).max() < 1e-11 * max(1.0, size):
+            if size <= 1e-10 * self._boundary.size(unknowns):
                 return unknowns, iteration
         return None, limit
 
-    def _system(self, n_intervals: int) -> casadi.Function:
-        """Residual and its Jacobian as functions of unknowns, ζ_0 and interval lengths."""
-        if n_intervals not in self._systems:
-            n, d, width = self.problem.n_states, self.rule.degree, self._width
-            first = MX.sym("first", 2 * n)
-            points = MX.sym("points", width, n_intervals * d)
-            zeta0, lengths = MX.sym("zeta0", n), MX.sym("lengths", n_intervals)
-            ends = points[: 2 * n, d - 1 :: d]
-            starts = casadi.horzcat(first, ends[:, :-1])
-            blocks = casadi.reshape(points, width * d, n_intervals)
-            interval = self._interval()
-            mapped = interval.map(n_intervals) if n_intervals > 1 else interval
-            defects = mapped(starts, blocks, lengths.T)
-            last = ends[:, -1]
-            manifold = last[n:] - 2 * DM(self.problem.P) @ last[:n]
-            residual = casadi.vertcat(first[:n] - zeta0, casadi.vec(defects), manifold)
-            unknowns = casadi.veccat(first, points)
-            self._systems[n_intervals] = casadi.Function(
-                "saddle",
-                [unknowns, zeta0, lengths],
-                [residual, casadi.jacobian(residual, unknowns)],
-            )
-        return self._systems[n_intervals]
+    def _guess(self, start: SaddleSolution, mesh: Array) -> Unknowns:
+        """Return the unknowns of another solution on this mesh."""
+        K, d = len(mesh) - 1, self.rule.degree
+        inner = self.rule.times(mesh).ravel()
+        ends, points = (np.hstack(start.sample(times)) for times in (mesh, inner))
+        players = (u.reshape(K, d, -1) for u in start.sample_players(inner))
+        return Unknowns(ends, points.reshape(K, d, -1), *players)
 
-    @property
-    def _width(self) -> int:
-        return 2 * self.problem.n_states + 2 * self.problem.n_inputs
-
-    def _interval(self) -> casadi.Function:
-        """Collocation defects and stationarity of both players on one interval."""
-        n, d = self.problem.n_states, self.rule.degree
-        derivative, _ = self.rule.coefficients
-        field = self._field()
-        start, h = SX.sym("start", 2 * n), SX.sym("h")
-        points = SX.sym("points", self._width, d)
-        slopes = casadi.horzcat(start, points[: 2 * n, :]) @ DM(derivative)
-        rows = []
-        for j in range(d):
-            rate, stationarity = field(points[:, j])
-            rows += [slopes[:, j] - h * rate, stationarity]
-        return casadi.Function("interval", [start, casadi.vec(points), h], [casadi.vertcat(*rows)])
-
-    def _field(self) -> casadi.Function:
-        """(ζ_dot, λ_dot) and (∂H/∂u_1, ∂H/∂u_2) at one point."""
-        problem, game = self.problem, self.problem.game
-        zeta, costate = problem.zeta, SX.sym("costate", problem.n_states)
-        u_1, u_2 = (SX.sym(name, problem.n_inputs) for name in ("u_control", "u_disturbance"))
-        rate = problem.drift + problem.input_matrix @ (u_1 + u_2)
-        cost = zeta.T @ DM(game.Q) @ zeta + u_1.T @ DM(game.R) @ u_1
-        cost -= game.gamma**2 * u_2.T @ DM(game.W_d) @ u_2
-        hamiltonian = cost + costate.T @ rate
-        players = [casadi.gradient(hamiltonian, u) for u in (u_1, u_2)]
-        flow = casadi.vertcat(rate, -casadi.gradient(hamiltonian, zeta))
-        point = casadi.vertcat(zeta, costate, u_1, u_2)
-        return casadi.Function("field", [point], [flow, casadi.vertcat(*players)])
-
-    def _linear_start(self, zeta0: Array, mesh: Array) -> Array:
-        """Return the unknowns of the linearised game: ζ(t) of its closed loop, λ = 2 P ζ."""
-        problem, game = self.problem, self.problem.game
-        A, B = problem.linearization
-        closed = A - B @ game.R_eff_inverse @ B.T @ problem.P
-        states = np.array([scipy.linalg.expm(closed * t) @ zeta0 for t in self._times(mesh)])
-        costates = 2.0 * states @ problem.P
-        push = costates @ B
-        u_1, u_2 = -0.5 * push @ game.R_inverse, 0.5 * push @ game.disturbance_inverse
-        points = np.hstack([states, costates, u_1, u_2])[1:]
-        return np.concatenate([states[0], costates[0], points.ravel()])
-
-    def _times(self, mesh: Array) -> Array:
-        inner = mesh[:-1, None] + np.diff(mesh)[:, None] * self.rule.nodes
-        return np.append(mesh[0], inner.ravel())
-
-    def _unpack(self, unknowns: Array, zeta0: Array, mesh: Array, iterations: int) -> SaddleSolution:
-        problem, n, k = self.problem, self.problem.n_states, self.problem.n_inputs
-        points = unknowns[2 * n :].reshape(-1, self._width)
-        states = np.vstack([unknowns[:n], points[:, :n]])
-        costates = np.vstack([unknowns[n : 2 * n], points[:, n : 2 * n]])
-        u_1, u_2 = points[:, 2 * n : 2 * n + k], points[:, 2 * n + k :]
-        _, weights = self.rule.coefficients
-        local = problem.game.local_cost(states[1:], u_1, u_2).reshape(-1, self.rule.degree)
-        rest = float(states[-1] @ problem.P @ states[-1])
+    def _solution(
+        self, unknowns: Unknowns, zeta0: Array, mesh: Array, iterations: int, seconds: float
+    ) -> SaddleSolution:
+        problem, game, n = self.problem, self.problem.game, self.problem.n_states
+        K, d, lengths = len(mesh) - 1, self.rule.degree, np.diff(mesh)
+        along = np.concatenate([unknowns.ends[:-1, None], unknowns.points], axis=1)
+        path = np.vstack([along.reshape(K * (d + 1), -1), unknowns.ends[-1:]])
+        times = np.column_stack([mesh[:-1], self.rule.times(mesh)]).ravel()
+        u_1, u_2 = unknowns.control, unknowns.disturbance
+        local = game.local_cost(unknowns.points[..., :n], u_1, u_2)
+        end = unknowns.ends[-1, :n]
+        slope = 0.0
+        if np.isfinite(game.gamma):
+            energy = np.sum((u_2 @ game.W_d) * u_2, axis=-1)
+            slope = -2.0 * game.gamma * float(lengths @ (energy @ self.rule.weights))
+            slope += float(end @ problem.P_gamma @ end)
         return SaddleSolution(
             zeta=zeta0,
-            value=float(np.diff(mesh) @ (local @ weights)) + rest,
-            costate=costates[0],
-            u_control=u_1,
-            u_disturbance=u_2,
-            times=self._times(mesh),
-            states=states,
-            costates=costates,
+            value=float(lengths @ (local @ self.rule.weights)) + float(end @ problem.P @ end),
+            costate=unknowns.ends[0, n:],
+            slope=slope,
+            mesh=mesh,
+            times=np.append(times, mesh[-1]),
+            states=path[:, :n],
+            costates=path[:, n:],
+            u_control=u_1.reshape(K * d, -1),
+            u_disturbance=u_2.reshape(K * d, -1),
             iterations=iterations,
+            seconds=seconds,
         )

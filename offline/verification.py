@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from scipy.interpolate import BarycentricInterpolator
@@ -11,6 +12,19 @@ from scipy.optimize import brentq
 from ..symbolic.vehicle import Array
 from .plant import Plant, Policy
 from .trajectory import Trajectory
+
+
+class Motion(Protocol):
+    """States as functions of time, smooth between the mesh points."""
+
+    @property
+    def mesh(self) -> Array:
+        """Interval ends, shape (K + 1,) [s]."""
+        ...
+
+    def sample(self, times: Array) -> tuple[Array, Array]:
+        """Return the states (len, n) at given times, and what goes with them."""
+        ...
 
 
 def reintegrate(plant: Plant, zeta0: Array, path: Trajectory) -> tuple[float, float]:
@@ -42,7 +56,7 @@ def _open_loop(polynomial: BarycentricInterpolator) -> Policy:
     return lambda t, zeta: np.asarray(polynomial(t))
 
 
-def sign_changes(plant: Plant, path: Trajectory, *, smallest: float = 1e-4, points: int = 8) -> Array:
+def sign_changes(plant: Plant, path: Motion, *, smallest: float = 1e-4, points: int = 8) -> Array:
     """Return the times at which a switching function changes sign, ascending [s].
 
     The functions are looked at `points` times an interval; a swing below `smallest` on either side
@@ -73,7 +87,7 @@ def _strong_crossings(values: Array, smallest: float) -> list[tuple[int, int]]:
     ]
 
 
-def _root(plant: Plant, path: Trajectory, column: int, left: float, right: float) -> float:
+def _root(plant: Plant, path: Motion, column: int, left: float, right: float) -> float:
     def switching(t: float) -> float:
         state = path.sample(np.array([t]))[0][0]
         return float(plant.switching(state)[column])

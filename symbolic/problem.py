@@ -102,6 +102,11 @@ class Problem:
         return riccati.game_riccati(*self.linearization, self.game)
 
     @cached_property
+    def P_gamma(self) -> Array:
+        """dP/dγ, (n, n), negative semidefinite: ζ'P ζ falls as the disturbance gets dearer."""
+        return riccati.gamma_derivative(*self.linearization, self.game, self.P)
+
+    @cached_property
     def gamma_star(self) -> float:
         """Smallest attenuation level γ* of the linearised game [-]."""
         game = self.game

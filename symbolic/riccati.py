@@ -62,6 +62,18 @@ def game_riccati(A: Array, B: Array, game: Game) -> Array:
     return np.asarray(0.5 * (polished + polished.T), dtype=np.float64)
 
 
+def gamma_derivative(A: Array, B: Array, game: Game, P: Array) -> Array:
+    """Return dP/dγ of the game Riccati solution, shape (n, n).
+
+    The envelope theorem: -2 γ times the integral of u_2'W_d u_2 on the saddle of the linear game, that
+    is (A - B R_eff^-1 B'P)'X + X (A - B R_eff^-1 B'P) = 2 γ^-3 P B W_d^-1 B'P.
+    """
+    push = B.T @ P
+    closed = A - B @ game.R_eff_inverse @ push
+    right = 2.0 * float(game.gamma) ** -3 * push.T @ np.linalg.solve(game.W_d, push)
+    return np.asarray(scipy.linalg.solve_continuous_lyapunov(closed.T, right), dtype=np.float64)
+
+
 def gamma_star(A: Array, B: Array, Q: Array, R: Array, W_d: Array, tolerance: float = 1e-9) -> float:
     """Return γ*, the infimum of γ for which the game Riccati equation is solved, by bisection [-].
 
