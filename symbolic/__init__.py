@@ -6,7 +6,7 @@ from .game import Game
 from .kernel import Export, Kernel
 from .model import Model, require_state
 from .problem import InverseDynamics, Problem, closed_form_problem
-from .riccati import game_riccati, gamma_star
+from .riccati import game_riccati, gamma_hamiltonian, gamma_star
 from .station import StationKeeping
 from .value import PointTerms, ValueFunctions
 from .vehicle import Thrusters, Vehicle
@@ -33,6 +33,7 @@ __all__ = [
     "drag_cubic",
     "find_function",
     "game_riccati",
+    "gamma_hamiltonian",
     "gamma_star",
     "quadratic",
     "require_state",

@@ -5,6 +5,15 @@
 P = X_2 X_1^-1 from the stable eigenspace [X_1; X_2] of the Hamiltonian matrix
 [[A, -B R_eff^-1 B'], [-Q, -A']]; it exists when no eigenvalue lies on the imaginary axis and X_1 is
 invertible, and it is the game's when P is positive semidefinite (Basar and Bernhard 1995, ch. 4).
+
+Which of these fails first as γ falls decides γ*. With G = (jω - A)^-1 B and Φ(ω) = G^*Q G, jω is an
+eigenvalue where det(I + Φ (R^-1 - γ^-2 W_d^-1)) = 0, that is where γ^2 is an eigenvalue of
+W_d^-1 (R - R (R + Φ)^-1 R). The largest of these falls continuously to 0 as ω grows, so the γ with
+eigenvalues on the axis are an interval (0, γ_H]; γ_H <= γ*, and neither exceeds the threshold of
+R_eff > 0. They are equal if A is stable and R_eff^-1 is semidefinite down to γ_H, as with one input
+or W_d proportional to R: with S = B R_eff^-1 B', X_1 x = 0 gives x'X_2'S X_2 x = 0, so S X_2 x = 0, so
+the kernel of X_1 is invariant and A' has an unstable eigenvalue in it. With A unstable, or R_eff^-1
+indefinite, X_1 may become singular before: P escapes, a conjugate point at infinity, and γ_H < γ*.
 """
 
 from __future__ import annotations
@@ -98,6 +107,29 @@ def gamma_star(A: Array, B: Array, Q: Array, R: Array, W_d: Array, tolerance: fl
     while upper - lower > tolerance * upper:
         middle = 0.5 * (lower + upper)
         if solvable(middle):
+            upper = middle
+        else:
+            lower = middle
+    return upper
+
+
+def gamma_hamiltonian(
+    A: Array, B: Array, Q: Array, R: Array, W_d: Array, tolerance: float = 1e-9
+) -> float:
+    """Return γ_H, above which the Hamiltonian matrix has no eigenvalue on the imaginary axis [-].
+
+    A route to γ* that needs no Riccati solution: γ_H = γ* if A is stable and R_eff^-1 semidefinite at
+    γ_H, and a lower bound otherwise; see above. `tolerance` is the relative width of the final bracket.
+    """
+    _require_stabilisable(A, B)
+    R_inverse, W_inverse = np.linalg.inv(R), np.linalg.inv(W_d)
+    lower, upper = 0.0, gamma_threshold(R, W_d)
+    while upper - lower > tolerance * upper:
+        middle = 0.5 * (lower + upper)
+        S = B @ (R_inverse - middle**-2 * W_inverse) @ B.T
+        eigenvalues = scipy.linalg.eigvals(np.block([[A, -S], [-Q, -A.T]]))
+        # two that meet on the axis part like a square root: 1e-8 is rounding
+        if np.abs(eigenvalues.real).min() > 1e-8 * np.abs(eigenvalues).max():
             upper = middle
         else:
             lower = middle
