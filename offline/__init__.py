@@ -1,10 +1,11 @@
 """Offline optimum: collocation, IPOPT, and the checks that don't trust its status."""
 
+from .certificate import Certificate
 from .direct import DirectSolution, DirectSolver
 from .plant import Plant
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings
-from .solve import Certificate, OfflineSolution, OfflineSolver, solve
+from .solve import OfflineSolution, OfflineSolver, solve
 from .trajectory import Trajectory
 
 __all__ = [

@@ -98,19 +98,21 @@ class DirectSolver:
         usable = method == "newton" and problem.inverse_dynamics is not None
         self._newton = StructuredNewton(problem) if usable else None
         self._start = LinearStart(problem)
-        self._programs: dict[int, Transcription] = {}
+        self._programs: dict[tuple[int, int], Transcription] = {}
 
     def solve(
         self,
         zeta0: Array,
         *,
         mesh: Array | None = None,
+        degree: int | None = None,
         guess: Trajectory | None = None,
         verify: bool = True,
     ) -> DirectSolution:
         """Return the optimum from `zeta0`, started from `guess` or the linear H-infinity policy.
 
-        Without `verify` the trajectory is not re-integrated, and defect and reintegrated_value are NaN.
+        `mesh` and `degree` replace the solver's own. Without `verify` the trajectory is not
+        re-integrated, and defect and reintegrated_value are NaN.
 
         Raises
         ------
@@ -121,29 +123,38 @@ class DirectSolver:
         """
         zeta0 = require_state(zeta0, self.problem.n_states)
         mesh = self.mesh if mesh is None else mesh
+        degree = self.degree if degree is None else degree
         started = time.perf_counter()
         found = None
         if self._newton is not None:
-            # what is not a minimum, or not found, is IPOPT's
+            grid = Grid(mesh, degree, self.problem.n_inputs)
+            # what Newton's method does not find is IPOPT's
             with contextlib.suppress(RunError):
-                found = self._by_newton(self._newton, zeta0, mesh, guess)
+                found = self._by_newton(self._newton, zeta0, grid, guess)
         if found is None:
-            found = self._by_ipopt(zeta0, mesh, guess)
+            found = self._by_ipopt(zeta0, mesh, degree, guess)
         found = replace(found, seconds=time.perf_counter() - started)
-        if not verify:
-            return found
-        defect, value = reintegrate(self.plant, zeta0, found.trajectory)
-        return replace(found, defect=defect, reintegrated_value=value)
+        return self.verified(found) if verify else found
 
     def solve_aligned(
-        self, zeta0: Array, *, tolerance: float = 1e-6, rounds: int = 6
+        self,
+        zeta0: Array,
+        *,
+        mesh: Array | None = None,
+        degree: int | None = None,
+        guess: Trajectory | None = None,
+        verify: bool = True,
+        tolerance: float = 1e-6,
+        rounds: int = 6,
     ) -> tuple[DirectSolution, Array]:
         """Return the optimum on a mesh with points where the velocities change sign, and their times.
 
         Drag |ν|ν is only C^1 there, which limits collocation to low order. Solve, locate the sign
         changes, put mesh points on them, and repeat until they move by less than `tolerance` [s].
+        Arguments and errors otherwise as of `solve`.
         """
-        solution = self.solve(zeta0, verify=False)
+        base = self.mesh if mesh is None else mesh
+        solution = self.solve(zeta0, mesh=base, degree=degree, guess=guess, verify=False)
         iterations, seconds = solution.iterations, solution.seconds
         known = np.empty(0)
         for _ in range(rounds):
@@ -151,30 +162,46 @@ class DirectSolver:
             if len(events) == len(known) and np.abs(events - known).max(initial=0.0) <= tolerance:
                 break
             known = events
-            mesh = aligned_mesh(self.mesh, events)
-            solution = self.solve(zeta0, mesh=mesh, guess=solution.trajectory, verify=False)
+            solution = self.solve(
+                zeta0,
+                mesh=aligned_mesh(base, events),
+                degree=degree,
+                guess=solution.trajectory,
+                verify=False,
+            )
             iterations += solution.iterations
             seconds += solution.seconds
-        defect, value = reintegrate(self.plant, zeta0, solution.trajectory)
-        checked = replace(
-            solution,
-            defect=defect,
-            reintegrated_value=value,
-            iterations=iterations,
-            seconds=seconds,
-        )
-        return checked, known
+        solution = replace(solution, iterations=iterations, seconds=seconds)
+        return (self.verified(solution) if verify else solution), known
+
+    def verified(self, solution: DirectSolution) -> DirectSolution:
+        """Return the solution with its defect and its value by re-integration."""
+        defect, value = reintegrate(self.plant, solution.zeta, solution.trajectory)
+        return replace(solution, defect=defect, reintegrated_value=value)
+
+    def beside(self, solution: DirectSolution, size: float) -> Trajectory | None:
+        """Return a guess off a point with a conjugate point, along its curvature; None without one.
+
+        `size` is the largest change of a state, in half-widths; its sign chooses the side.
+        """
+        if solution.curvature is None:
+            return None
+        path = solution.trajectory
+        grid = Grid(path.mesh, path.degree, self.problem.n_inputs)
+        bend = grid.trajectory(np.zeros_like(solution.zeta), solution.curvature)
+        bend = bend * size / np.abs(bend / self.problem.scale).max()
+        return replace(path, states=path.states + bend)
 
     def _by_newton(
-        self, newton: StructuredNewton, zeta0: Array, mesh: Array, guess: Trajectory | None
+        self, newton: StructuredNewton, zeta0: Array, grid: Grid, guess: Trajectory | None
     ) -> DirectSolution:
-        grid = Grid(mesh, self.degree, self.problem.n_inputs)
         if guess is None:
             start = newton.linear_guess(zeta0, grid)
         else:
             start = guess.accelerations(grid.times).reshape(grid.K, grid.degree, grid.k)
         found = newton.solve(zeta0, grid, start)
-        path = Trajectory(mesh, np.append(mesh[0], grid.times), found.states, found.v, self.degree)
+        times = np.append(grid.mesh[0], grid.times)
+        path = Trajectory(grid.mesh, times, found.states, found.v, grid.degree)
         return self._solution(
             path,
             value=found.value,
@@ -186,8 +213,10 @@ class DirectSolver:
             iterations=found.iterations,
         )
 
-    def _by_ipopt(self, zeta0: Array, mesh: Array, guess: Trajectory | None) -> DirectSolution:
-        program = self._program(len(mesh) - 1)
+    def _by_ipopt(
+        self, zeta0: Array, mesh: Array, degree: int, guess: Trajectory | None
+    ) -> DirectSolution:
+        program = self._program(len(mesh) - 1, degree)
         times = program.times(mesh)
         first = self._start.sample(zeta0, times)[:2] if guess is None else guess.sample(times)
         answer = program.solver(
@@ -203,7 +232,7 @@ class DirectSolver:
                 f"{statistics['iter_count']} iterations from {np.array2string(zeta0, precision=3)}"
             )
         states, v = program.unpack(np.array(answer["x"]).ravel())
-        path = Trajectory(mesh, np.append(mesh[0], times), states, v, self.degree)
+        path = Trajectory(mesh, np.append(mesh[0], times), states, v, degree)
         # IPOPT adds to the Hessian whenever the inertia is not that of a strict minimum
         added = statistics["iterations"]["regularization_size"]
         return self._solution(
@@ -217,10 +246,11 @@ class DirectSolver:
             iterations=int(statistics["iter_count"]),
         )
 
-    def _program(self, n_intervals: int) -> Transcription:
-        if n_intervals not in self._programs:
-            self._programs[n_intervals] = Transcription(self.problem, n_intervals, self.degree)
-        return self._programs[n_intervals]
+    def _program(self, n_intervals: int, degree: int) -> Transcription:
+        key = (n_intervals, degree)
+        if key not in self._programs:
+            self._programs[key] = Transcription(self.problem, n_intervals, degree)
+        return self._programs[key]
 
     def _solution(
         self,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..symbolic.vehicle import Array
 
@@ -35,3 +36,16 @@ def aligned_mesh(mesh: Array, events: Array, *, closest: float = 0.2) -> Array:
             points = sorted({*points, float(event)})
         taken.add(float(event))
     return np.array(points)
+
+
+def halved(mesh: Array, chosen: NDArray[np.bool_]) -> Array:
+    """Return the mesh with the chosen intervals, (K,), cut in two."""
+    middles = 0.5 * (mesh[:-1] + mesh[1:])
+    return np.sort(np.append(mesh, middles[chosen]))
+
+
+def extended(mesh: Array, horizon: float) -> Array:
+    """Return the mesh continued to a longer horizon by intervals as long as its last."""
+    last = mesh[-1] - mesh[-2]
+    n_more = int(np.ceil((horizon - mesh[-1]) / last))
+    return np.append(mesh, np.linspace(mesh[-1], horizon, n_more + 1)[1:])

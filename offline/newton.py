@@ -30,7 +30,7 @@ from ..symbolic.batch import BatchKernel
 from ..symbolic.kernel import dense_function
 from ..symbolic.vehicle import Array
 from .guess import LinearStart
-from .stages import Grid, Pass, adjoint, backward
+from .stages import Bent, Grid, Pass, adjoint, backward
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ class _Model:
 
     value: float
     accelerations: Array
+    points: Array
     states: Array
     v: Array
     end: Array
@@ -118,7 +119,7 @@ class StructuredNewton:
         """
         current = self._model(zeta0, grid, accelerations)
         for iteration in range(1, max_iterations + 1):
-            found = self._backward(grid, current)
+            found = self._step(grid, current)
             trial = self._search(zeta0, grid, current, found.forward(grid), found.promised)
             small = found.promised <= tolerance**2 * current.value
             if trial is None and not small and found.promised > 1e-12 * current.value:
@@ -140,17 +141,35 @@ class StructuredNewton:
     @cached_property
     def _point(self) -> BatchKernel:
         """L with gradient (3 k,) and Hessian (3 k, 3 k) in (η, η_dot, a), and v."""
+        point, L, v = self._cost()
+        hessian, gradient = casadi.hessian(L, point)
+        outputs = {"cost": L, "gradient": gradient, "hessian": hessian, "v": v}
+        return BatchKernel(
+            dense_function("newton_point", {"point": point}, outputs), compiled=self._compiled
+        )
+
+    @cached_property
+    def _convex_point(self) -> BatchKernel:
+        """The Gauss-Newton part of that Hessian, 2 Q and 2 v_z'R_eff v_z: positive semidefinite."""
+        point, _, v = self._cost()
+        sensitivity = casadi.jacobian(v, point)
+        own = 2 * sensitivity.T @ DM(self.problem.game.R_eff) @ sensitivity
+        k = self.problem.n_inputs
+        state = casadi.diagcat(SX(DM(2 * self.problem.game.Q)), SX(k, k))
+        return BatchKernel(
+            dense_function("newton_convex", {"point": point}, {"hessian": own + state}),
+            compiled=self._compiled,
+        )
+
+    def _cost(self) -> tuple[SX, SX, SX]:
+        """Return the symbol (η, η_dot, a), and L and v of it."""
         problem, inverse = self.problem, self.problem.inverse_dynamics
         assert inverse is not None  # checked on construction
         zeta, a, v = problem.zeta, inverse.acceleration, inverse.v
         L = zeta.T @ DM(problem.game.Q) @ zeta + v.T @ DM(problem.game.R_eff) @ v
         point = SX.sym("point", 3 * problem.n_inputs)
         L, v = casadi.substitute([L, v], [casadi.vertcat(zeta, a)], [point])
-        hessian, gradient = casadi.hessian(L, point)
-        outputs = {"cost": L, "gradient": gradient, "hessian": hessian, "v": v}
-        return BatchKernel(
-            dense_function("newton_point", {"point": point}, outputs), compiled=self._compiled
-        )
+        return point, L, v
 
     def _model(self, zeta0: Array, grid: Grid, accelerations: Array) -> _Model:
         stages = grid.stages(zeta0, accelerations)
@@ -161,6 +180,7 @@ class StructuredNewton:
         return _Model(
             value=value,
             accelerations=accelerations,
+            points=points,
             states=np.vstack([zeta0, points[:, : 2 * grid.k]]),
             v=v,
             end=end,
@@ -168,10 +188,24 @@ class StructuredNewton:
             hessian=grid.condense(hessian),
         )
 
-    def _backward(self, grid: Grid, model: _Model) -> Pass:
+    def _step(self, grid: Grid, model: _Model) -> Pass:
+        """Return Newton's step, or where the model is not convex one between it and Gauss-Newton's."""
+        found = self._backward(grid, model, model.hessian)
+        if isinstance(found, Pass):
+            return found
+        (flat,) = self._convex_point(model.points)
+        convex = grid.condense(flat)
+        for part in (0.5, 0.0):
+            blend = convex + part * (model.hessian - convex)
+            found = self._backward(grid, model, blend)
+            if isinstance(found, Pass):
+                return found
+        raise RunError("the Gauss-Newton model of the cost is not convex; Q and R_eff must be")
+
+    def _backward(self, grid: Grid, model: _Model, hessian: Array) -> Pass | Bent:
         P = 2.0 * self.problem.P
         inertia = self._inertia(grid)
-        return backward(grid, model.hessian, model.gradient, P, P @ model.end, inertia)
+        return backward(grid, hessian, model.gradient, P, P @ model.end, inertia)
 
     def _inertia(self, grid: Grid) -> Array:
         """Second derivative of v'R_eff v in a_i1 ... a_id at rest, (K, d k, d k)."""
@@ -194,16 +228,19 @@ class StructuredNewton:
         return None
 
     def _result(self, grid: Grid, model: _Model, iterations: int) -> NewtonResult:
-        found = self._backward(grid, model)
-        strict = found.bent is None
-        rest = 2.0 * self.problem.P @ model.end
+        found = self._backward(grid, model, model.hessian)
+        if isinstance(found, Pass):
+            costate, hessian, curvature = found.p, found.P, None
+        else:
+            costate = adjoint(grid, model.gradient, 2.0 * self.problem.P @ model.end)
+            hessian, curvature = None, found.curvature(grid)
         return NewtonResult(
             value=model.value,
-            costate=found.p if strict else adjoint(grid, model.gradient, rest),
-            hessian=found.P if strict else None,
+            costate=costate,
+            hessian=hessian,
             accelerations=model.accelerations,
             states=model.states,
             v=model.v,
-            curvature=found.curvature(grid),
+            curvature=curvature,
             iterations=iterations,
         )

@@ -3,52 +3,21 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ..symbolic import Problem
+from ..symbolic import Problem, RunError
 from ..symbolic.vehicle import Array
+from .certificate import Certificate
 from .direct import DirectSolution, DirectSolver
-from .mesh import aligned_mesh
+from .extremals import find_extremals
+from .mesh import extended, halved
+from .refinement import Refined, refine
+from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """What is known of the error of a solution; none of it is the solver's own status.
-
-    Attributes
-    ----------
-    value_error : relative; mesh refinement (K to 2K), re-integration and horizon together
-    defect : largest gap of the re-integrated trajectory to the collocated one, in half-widths
-    hji_residual : |H| of (7) at ζ with the costate, relative to ζ'Qζ
-    costate_error : costate against a central difference of the value along a random direction, and
-        its change on a finer mesh, relative to the costate's norm in half-widths
-    horizon_error : relative change of the value when the horizon is doubled
-    """
-
-    value_error: float
-    defect: float
-    hji_residual: float
-    costate_error: float
-    horizon_error: float
-
-    def faults(self, settings: OfflineSettings) -> list[str]:
-        """Return what breaks the tolerances, in words; empty if the certificate holds."""
-        limits = {
-            "value_error": settings.value_tolerance,
-            "defect": settings.defect_tolerance,
-            "hji_residual": settings.hji_tolerance,
-            "costate_error": settings.costate_tolerance,
-        }
-        values = asdict(self)
-        return [
-            f"{name} is {values[name]:.1e}, over {limit:.0e}"
-            for name, limit in limits.items()
-            if not values[name] <= limit
-        ]
+from .trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -58,14 +27,20 @@ class OfflineSolution:
     Attributes
     ----------
     direct : value, costate, policies and trajectory
-    certificate : its error
+    saddle : the saddle point solved by itself; None where it was not found
+    others : further extremals, the cheapest first, each on its own aligned mesh
+    certificate : the error of `direct`
     faults : what breaks the tolerances; empty if the certificate holds
+    rounds : of mesh refinement
     seconds : wall time, certificate included
     """
 
     direct: DirectSolution
+    saddle: SaddleSolution | None
+    others: list[DirectSolution]
     certificate: Certificate
     faults: list[str]
+    rounds: int
     seconds: float
 
     @property
@@ -85,65 +60,121 @@ class OfflineSolver:
     def __init__(self, problem: Problem, settings: OfflineSettings | None = None) -> None:
         self.problem = problem
         self.settings = OfflineSettings() if settings is None else settings
-        self.direct = self._solver(1, 1)
+        self.horizon = self.settings.horizon or chosen_horizon(problem, self.settings)
+        self.direct = DirectSolver(
+            problem,
+            horizon=self.horizon,
+            n_intervals=self.settings.intervals,
+            degree=self.settings.degree,
+            grading=self.settings.grading,
+            method=self.settings.method,
+        )
 
-    def solve(self, zeta0: Array) -> OfflineSolution:
+    def solve(self, zeta0: Array, guess: Trajectory | None = None) -> OfflineSolution:
         """Return the optimum from `zeta0` and its certificate.
+
+        `guess` is where the first solve starts, instead of the linear H-infinity policy; the other
+        starts of the search for extremals, and the saddle point, don't use it.
 
         Raises
         ------
         InputError
             If the state is not finite, of the wrong shape or pitched by 90 degrees.
         RunError
-            If IPOPT does not converge.
+            If no solver converges.
         """
         started = time.perf_counter()
-        if self.settings.aligned:
-            solution, events = self.direct.solve_aligned(zeta0)
-        else:
-            solution, events = self.direct.solve(zeta0), np.empty(0)
-        certificate = self._certify(solution, events)
+        first = self.direct.solve(zeta0, guess=guess, verify=False)
+        refined, others = self._cheapest(first)
+        saddle = self._saddle_point(refined.solution)
+        certificate = self._certify(refined, others, saddle)
         return OfflineSolution(
-            direct=solution,
+            direct=refined.solution,
+            saddle=saddle,
+            others=others,
             certificate=certificate,
             faults=certificate.faults(self.settings),
+            rounds=refined.rounds,
             seconds=time.perf_counter() - started,
         )
 
-    def _certify(self, solution: DirectSolution, events: Array) -> Certificate:
+    def _cheapest(self, first: DirectSolution) -> tuple[Refined, list[DirectSolution]]:
+        """Return the refined cheapest extremal, and the others on aligned meshes."""
+        extremals = find_extremals(self.direct, first, starts=self.settings.starts)
+        if self.settings.aligned and len(extremals) > 1:
+            # which is cheapest may hang on the error of the first mesh
+            extremals = [
+                self.direct.solve_aligned(first.zeta, guess=each.trajectory, verify=False)[0]
+                for each in extremals
+            ]
+            extremals.sort(key=lambda solution: solution.value)
+        best = extremals[0]
+        return refine(self.direct, self.settings, best.zeta, best.trajectory), extremals[1:]
+
+    def _saddle_point(self, solution: DirectSolution) -> SaddleSolution | None:
+        """Return the cheapest saddle point found; from perturbed states too where the first is dearer.
+
+        It is never started from the direct solution.
+        """
+        found: list[SaddleSolution] = []
+        scale = self.problem.scale
+        tolerance = 0.1 * self.settings.value_tolerance * abs(solution.value)
+        shifts = 0.05 * scale * np.random.default_rng(1).standard_normal((4, len(scale)))
+        for shift in (np.zeros_like(scale), *shifts):
+            try:
+                start = self._saddle.solve(solution.zeta + shift) if shift.any() else None
+                found.append(self._saddle.solve_aligned(solution.zeta, start=start)[0])
+            except (RunError, ValueError):
+                continue
+            if found[-1].value <= solution.value + tolerance:
+                break
+        return min(found, key=lambda saddle: saddle.value, default=None)
+
+    def _certify(
+        self, refined: Refined, others: list[DirectSolution], saddle: SaddleSolution | None
+    ) -> Certificate:
+        solution, direct = refined.solution, self.direct
         value = max(abs(solution.value), np.finfo(float).tiny)
+        path = solution.trajectory
+        every = np.ones(len(path.mesh) - 1, dtype=bool)
+        fine, long = halved(path.mesh, every), extended(path.mesh, 2.0 * self.horizon)
         finer, longer = (
-            solver.solve(
-                solution.zeta,
-                mesh=aligned_mesh(solver.mesh, events),
-                guess=solution.trajectory,
-                verify=False,
-            )
-            for solver in (self._finer, self._longer)
+            direct.solve(solution.zeta, mesh=mesh, degree=path.degree, guess=path, verify=False)
+            for mesh in (fine, long)
         )
         refinement = abs(finer.value - solution.value) / value
         integration = abs(solution.reintegrated_value - solution.value) / value
-        horizon = abs(longer.value - finer.value) / value
+        horizon = abs(longer.value - solution.value) / value
+        disagreement = abs(saddle.value - solution.value) / value if saddle else np.inf
+        same = 10.0 * self.settings.value_tolerance * value
         return Certificate(
-            value_error=refinement + integration + horizon,
+            value_error=refinement + integration + horizon + disagreement,
             defect=solution.defect,
             hji_residual=solution.hji_residual,
-            costate_error=self._costate_error(solution, longer),
+            costate_error=self._costate_error(solution, (finer, longer)),
             horizon_error=horizon,
+            refinement_error=refinement,
+            integration_error=integration,
+            disagreement=disagreement,
+            second_order=solution.second_order,
+            gradient_unique=not any(
+                other.second_order and other.value - solution.value <= same for other in others
+            ),
         )
 
     def _costate_error(
-        self, solution: DirectSolution, better: DirectSolution, step: float = 1e-3
+        self, solution: DirectSolution, better: tuple[DirectSolution, ...], step: float = 1e-3
     ) -> float:
         """Compare λ'd with (V(ζ + h d) - V(ζ - h d)) / 2h, d a seeded direction in half-widths."""
-        scale = self.problem.scale
+        scale, path = self.problem.scale, solution.trajectory
         direction = np.random.default_rng(0).standard_normal(len(scale))
         direction *= scale / np.linalg.norm(direction)
         ahead, behind = (
             self.direct.solve(
                 solution.zeta + h * direction,
-                mesh=solution.trajectory.mesh,
-                guess=solution.trajectory,
+                mesh=path.mesh,
+                degree=path.degree,
+                guess=path,
                 verify=False,
             ).value
             for h in (step, -step)
@@ -152,27 +183,27 @@ class OfflineSolver:
         # near the origin, relative to the gradient at the size of the difference step
         least = 1e-3 * float(np.linalg.norm(2.0 * self.problem.P @ scale * scale))
         norm = max(float(np.linalg.norm(solution.costate * scale)), least)
-        refinement = float(np.linalg.norm((better.costate - solution.costate) * scale))
-        return (abs(float(solution.costate @ direction) - difference) + refinement) / norm
+        changes = [np.linalg.norm((other.costate - solution.costate) * scale) for other in better]
+        return (abs(float(solution.costate @ direction) - difference) + float(sum(changes))) / norm
 
     @cached_property
-    def _finer(self) -> DirectSolver:
-        return self._solver(2, 1)
+    def _saddle(self) -> SaddleSolver:
+        return SaddleSolver(self.problem, horizon=self.horizon)
 
-    @cached_property
-    def _longer(self) -> DirectSolver:
-        return self._solver(2, 2)
 
-    def _solver(self, finer: int, longer: int) -> DirectSolver:
-        settings = self.settings
-        # the graded mesh of twice the horizon keeps its first intervals with log(2) more grading
-        return DirectSolver(
-            self.problem,
-            horizon=longer * settings.horizon,
-            n_intervals=finer * settings.intervals,
-            degree=settings.degree,
-            grading=settings.grading + (np.log(longer) if settings.grading > 0.0 else 0.0),
-        )
+def chosen_horizon(problem: Problem, settings: OfflineSettings) -> float:
+    """Return T [s] after which the slowest mode of the linearised closed loop has decayed enough.
+
+    The state falls like e^(-α T), α its slowest rate, and the cost to go like its square; T makes
+    that a hundredth of the requested value error, and the square root of it, what is left in the
+    costate, a hundredth of the requested costate error. Doubling it is part of the certificate.
+    """
+    A, B = problem.linearization
+    closed = A - B @ problem.game.R_eff_inverse @ B.T @ problem.P
+    slowest = float(-np.linalg.eigvals(closed).real.max())
+    by_value = -np.log(0.01 * settings.value_tolerance) / 2.0
+    by_costate = -np.log(0.01 * settings.costate_tolerance) / 2.0
+    return float(max(by_value, by_costate) / slowest)
 
 
 def solve(problem: Problem, zeta0: Array, settings: OfflineSettings | None = None) -> OfflineSolution:

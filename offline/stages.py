@@ -39,6 +39,11 @@ class Grid:
         nodes = radau_rule(self.degree).nodes
         return np.asarray((self.mesh[:-1, None] + np.diff(self.mesh)[:, None] * nodes).ravel())
 
+    def trajectory(self, zeta0: Array, accelerations: Array) -> Array:
+        """Return the states at 0 and the collocation points, (K d + 1, 2 k)."""
+        points = self.points(self.stages(zeta0, accelerations))
+        return np.vstack([zeta0, points[:, : 2 * self.k]])
+
     def points(self, stages: Array) -> Array:
         """Return (η, η_dot, a) at the collocation points, (K d, 3 k), from stage unknowns."""
         return np.asarray((self.to_points @ stages[:, None]).reshape(-1, 3 * self.k))
@@ -80,68 +85,79 @@ def _to_points(rule: RadauRule, h: Array) -> Array:
     return C
 
 
+Gains = list[tuple[Array, Array]]
+
+
 @dataclass(frozen=True)
 class Pass:
-    """A backward pass through all stages.
+    """A backward pass through stages that are all convex.
 
     Attributes
     ----------
     P, p : (n, n) and (n,) of the cost to go p'x + 1/2 x'P x of the first stage
-    promised : by how much the convex model falls along the step
+    promised : by how much the model falls along the step
     gains : of each stage, the step of its accelerations as K x + k
-    bent : last stage whose block is not positive definite, the one that the backward pass meets first,
-        and the direction of its most negative curvature; None where all are
     """
 
     P: Array
     p: Array
     promised: float
-    gains: list[tuple[Array, Array]]
-    bent: tuple[int, Array] | None
+    gains: Gains
 
     def forward(self, grid: Grid) -> Array:
         """Return the minimising step of the accelerations, (K, d, k)."""
         return _forward(grid, self.gains, 0, np.zeros(2 * grid.k))
 
-    def curvature(self, grid: Grid) -> Array | None:
-        """Return accelerations (K, d, k) along which the second variation is not positive, or None.
 
-        Nothing before the bent stage, its direction in it, and the optimal answer after it.
+@dataclass(frozen=True)
+class Bent:
+    """A backward pass that met a stage that is not convex: a conjugate point.
+
+    Attributes
+    ----------
+    stage : its number
+    direction : (d k,) of the most negative curvature relative to the inertia
+    gains : of the stages after it
+    """
+
+    stage: int
+    direction: Array
+    gains: Gains
+
+    def curvature(self, grid: Grid) -> Array:
+        """Return accelerations (K, d, k) along which the second variation is not positive.
+
+        Nothing before the stage, its direction in it, and the optimal answer after it.
         """
-        if self.bent is None:
-            return None
-        stage, direction = self.bent
-        state = grid.flow[stage] @ np.concatenate([np.zeros(2 * grid.k), direction])
-        answer = [(gain, np.zeros_like(constant)) for gain, constant in self.gains[stage + 1 :]]
+        state = grid.flow[self.stage] @ np.concatenate([np.zeros(2 * grid.k), self.direction])
+        answer = [(gain, np.zeros_like(constant)) for gain, constant in self.gains]
         curve = np.zeros((grid.K, grid.degree, grid.k))
-        curve[stage] = direction.reshape(grid.degree, grid.k)
-        curve[stage + 1 :] = _forward(grid, answer, stage + 1, state)
+        curve[self.stage] = self.direction.reshape(grid.degree, grid.k)
+        curve[self.stage + 1 :] = _forward(grid, answer, self.stage + 1, state)
         return curve
 
 
-def backward(grid: Grid, hessian: Array, gradient: Array, P: Array, p: Array, inertia: Array) -> Pass:
+def backward(
+    grid: Grid, hessian: Array, gradient: Array, P: Array, p: Array, inertia: Array
+) -> Pass | Bent:
     """Riccati recursion over the stages, from the cost to go p'x + 1/2 x'P x of the end.
-
-    A stage that is not convex takes the absolute values of its curvatures, measured against `inertia`:
-    the step descends, and stays Newton's in every direction that is convex (Dauphin et al. 2014).
 
     Parameters
     ----------
     hessian, gradient : (K, (2 + d) k, (2 + d) k) and (K, (2 + d) k) of the stages
-    inertia : (K, d k, d k), positive definite
+    inertia : (K, d k, d k), positive definite, what a negative curvature is measured against
     """
     n = 2 * grid.k
-    gains: list[tuple[Array, Array]] = []
-    promised, bent = 0.0, None
+    gains: Gains = []
+    promised = 0.0
     for i in range(grid.K - 1, -1, -1):
         F = grid.flow[i]
         H = hessian[i] + F.T @ P @ F
         g = gradient[i] + F.T @ p
         factor, failed = lapack.dpotrf(H[n:, n:], lower=1)
         if failed:
-            convex, direction = _convexified(H[n:, n:], inertia[i])
-            bent = (i, direction) if bent is None else bent
-            factor, _ = lapack.dpotrf(convex, lower=1)
+            _, vectors = scipy.linalg.eigh(H[n:, n:], inertia[i])
+            return Bent(i, vectors[:, 0], gains[::-1])
         right = np.column_stack([H[n:, :n], g[n:]])
         half, _ = lapack.dtrtrs(factor, right, lower=1)
         answer, _ = lapack.dtrtrs(factor, half, lower=1, trans=1)
@@ -149,15 +165,7 @@ def backward(grid: Grid, hessian: Array, gradient: Array, P: Array, p: Array, in
         p = g[:n] - half[:, :n].T @ half[:, n]
         promised += 0.5 * float(half[:, n] @ half[:, n])
         gains.append((-answer[:, :n], -answer[:, n]))
-    return Pass(P, p, promised, gains[::-1], bent)
-
-
-def _convexified(block: Array, inertia: Array, least: float = 1e-6) -> tuple[Array, Array]:
-    """Return the block with |λ| for its eigenvalues relative to `inertia`, and the lowest's vector."""
-    eigenvalues, vectors = scipy.linalg.eigh(block, inertia)
-    back = inertia @ vectors
-    size = np.maximum(np.abs(eigenvalues), least * np.abs(eigenvalues).max())
-    return (back * size) @ back.T, vectors[:, 0]
+    return Pass(P, p, promised, gains[::-1])
 
 
 def adjoint(grid: Grid, gradient: Array, p: Array) -> Array:
@@ -168,7 +176,7 @@ def adjoint(grid: Grid, gradient: Array, p: Array) -> Array:
     return p
 
 
-def _forward(grid: Grid, gains: list[tuple[Array, Array]], first: int, state: Array) -> Array:
+def _forward(grid: Grid, gains: Gains, first: int, state: Array) -> Array:
     step = np.empty((len(gains), grid.degree * grid.k))
     for i, (gain, constant) in enumerate(gains):
         step[i] = gain @ state + constant

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -64,7 +65,7 @@ def test_certificate_bounds_the_true_value_error(
     reference_problem: Problem, intervals: int, aligned: bool
 ) -> None:
     """Coarse solves: their value is as far off as they say, or less, and they say that it is far."""
-    settings = OfflineSettings(intervals=intervals, aligned=aligned)
+    settings = OfflineSettings(horizon=120.0, intervals=intervals, degree=5, aligned=aligned, rounds=1)
     answer = OfflineSolver(reference_problem, settings).solve(FAST_STATE)
     error = abs(answer.value - FAST_VALUE) / FAST_VALUE
     print(f"K={intervals} aligned={aligned}: true value error {error:.1e}, {answer.certificate}")
@@ -78,7 +79,7 @@ def test_certificate_bounds_the_true_costate_error(
     reference_problem: Problem, intervals: int, aligned: bool
 ) -> None:
     """A costate can be the gradient of the value on its mesh and still be wrong with the mesh."""
-    settings = OfflineSettings(intervals=intervals, aligned=aligned)
+    settings = OfflineSettings(horizon=120.0, intervals=intervals, degree=5, aligned=aligned, rounds=1)
     answer = OfflineSolver(reference_problem, settings).solve(FAST_STATE)
     exact = fast_costate(reference_problem)
     gap = np.linalg.norm((answer.costate - exact) * HALF_WIDTHS)
@@ -133,11 +134,25 @@ def test_certificate_at_the_origin(game: str, reference_problem: Problem) -> Non
 
 def test_faults_name_what_breaks_its_tolerance() -> None:
     settings = OfflineSettings()
-    good = Certificate(1e-7, 1e-7, 1e-7, 1e-5, 1e-9)
+    good = Certificate(
+        value_error=1e-7,
+        defect=1e-7,
+        hji_residual=1e-7,
+        costate_error=1e-5,
+        horizon_error=1e-9,
+        refinement_error=1e-8,
+        integration_error=1e-8,
+        disagreement=1e-9,
+        second_order=True,
+        gradient_unique=True,
+    )
     assert good.faults(settings) == []
-    bad = Certificate(2e-6, 1e-7, float("nan"), 1e-3, 1.0)
+    bad = replace(
+        good, value_error=2e-6, hji_residual=float("nan"), costate_error=1e-3, second_order=False
+    )
     faults = bad.faults(settings)
-    assert len(faults) == 3
-    assert faults[0] == "value_error is 2.0e-06, over 1e-06"
+    assert len(faults) == 4
+    assert faults[0] == "value_error is 2.0e-06, over 1e-07"
     assert faults[1].startswith("hji_residual is nan")
     assert faults[2].startswith("costate_error is 1.0e-03")
+    assert "conjugate point" in faults[3]

@@ -42,7 +42,7 @@ def test_shipped_scenario_is_the_reference_game(reference_problem: Problem) -> N
     np.testing.assert_allclose(shipped.P, reference_problem.P, rtol=1e-9, atol=1e-9)
     settings = OfflineSettings()
     assert quick_scenario().offline == settings
-    assert settings.horizon == 120.0
+    assert settings.horizon is None
 
 
 def test_reintegration_by_scipy_agrees(optimum: tuple[DirectSolution, Array]) -> None:
