@@ -29,6 +29,7 @@ COMMANDS = {
 }
 NOT_YET = ("sweep", "replay")
 DEFAULT_SCENARIO = "bluerov2-heavy"
+GAMMAS_HELP = "also the value at these attenuation levels, or at 12 of them: 'grid'"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -122,6 +123,7 @@ def parser() -> argparse.ArgumentParser:
             command.add_argument(
                 "--states", type=Path, metavar="FILE", help=".npy or CSV file of rows of 12 numbers"
             )
+            command.add_argument("--gammas", metavar="G,G,...", help=GAMMAS_HELP)
         if name == "compare":
             command.add_argument(
                 "--n-states",
@@ -156,10 +158,10 @@ def _common_options(command: argparse.ArgumentParser) -> None:
 
 
 def _joined(arguments: list[str]) -> list[str]:
-    """Join `--state` and `--set` with their value, so that a value may begin with a minus sign."""
+    """Join `--state`, `--gammas` and `--set` with their value, which may begin with a minus sign."""
     joined, i = [], 0
     while i < len(arguments):
-        if arguments[i] in ("--state", "--set") and i + 1 < len(arguments):
+        if arguments[i] in ("--state", "--gammas", "--set") and i + 1 < len(arguments):
             joined.append(f"{arguments[i]}={arguments[i + 1]}")
             i += 1
         else:

@@ -14,6 +14,7 @@ from ..comparison.runs import optimal_record
 from ..offline import OfflineSolver
 from ..symbolic import InputError, RunError, require_state
 from ..symbolic.vehicle import Array
+from .gamma import add_curves, print_curves, requested_curves
 from .output import load_scenario, output_folder, print_json, print_table, progress, write_json
 
 CERTIFICATE = ("value_error", "defect", "hji_residual", "costate_error", "horizon_error")
@@ -25,12 +26,14 @@ def run(options: argparse.Namespace) -> int:
     states = _states(options, scenario)
     station = scenario.station_keeping()
     solver = OfflineSolver(station.problem, scenario.offline)
+    curves = requested_curves(options, station.problem, scenario.offline.horizon)
     folder = output_folder(options)
     rows: list[dict[str, Any]] = []
     with progress(options) as tell:
         for i, zeta0 in enumerate(states):
             tell("offline optima", i / len(states))
             rows.append(_solve(scenario, solver, folder, zeta0, i))
+        add_curves(curves, rows, folder, tell)
     linear = {"P": station.problem.P, "gamma_star": station.problem.gamma_star}
     answer = {"states": rows, "linear": linear}
     write_json(folder / "offline.json", answer)
@@ -38,6 +41,7 @@ def run(options: argparse.Namespace) -> int:
         print_json(answer)
     else:
         _print(rows, station.problem.gamma_star, folder)
+        print_curves(rows)
     return 1 if any(row["faults"] for row in rows) else 0
 
 

@@ -2,6 +2,7 @@
 
 from .certificate import Certificate
 from .direct import DirectSolution, DirectSolver
+from .gamma_curve import GammaCurve, GammaCurveSolver, GammaPoint, value_against_gamma
 from .plant import Plant
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings
@@ -12,6 +13,9 @@ __all__ = [
     "Certificate",
     "DirectSolution",
     "DirectSolver",
+    "GammaCurve",
+    "GammaCurveSolver",
+    "GammaPoint",
     "OfflineSettings",
     "OfflineSolution",
     "OfflineSolver",
@@ -20,4 +24,5 @@ __all__ = [
     "SaddleSolver",
     "Trajectory",
     "solve",
+    "value_against_gamma",
 ]

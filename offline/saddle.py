@@ -57,7 +57,7 @@ class SaddleSolution:
     seconds: float
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """Return states and costates, each (len, n), at given times, by the polynomials."""
+        """Return states and costates, each (len, n), at times >= 0; rest beyond T."""
         return self._sampled(self._points, times, self.states[:-1], self.costates[:-1])
 
     def sample_players(self, times: Array) -> tuple[Array, Array]:
@@ -75,6 +75,7 @@ class SaddleSolution:
         width = first.shape[1]
         both = np.hstack([first, second]).reshape(len(self.mesh) - 1, len(points), 2 * width)
         sampled = interpolate(points, self.mesh, both, times)
+        sampled[times > self.mesh[-1]] = 0.0
         return sampled[:, :width], sampled[:, width:]
 
 
@@ -102,6 +103,7 @@ class SaddleSolver:
         self.problem = problem
         self.rule = GaussRule(degree)
         self.mesh = graded_mesh(horizon, n_intervals, grading)
+        self._grading = grading
         self.plant = Plant(problem)
         self._field = ExtremalField(problem, compiled=compiled)
         self._boundary = BoundaryProblem(problem, self._field, self.rule)
@@ -117,6 +119,18 @@ class SaddleSolver:
         other = copy.copy(self)
         other.problem = self.problem.with_gamma(gamma)
         other._boundary = BoundaryProblem(other.problem, self._field, self.rule)
+        return other
+
+    def with_horizon(self, horizon: float) -> SaddleSolver:
+        """Return the solver of the same problem with a longer T [s], its first intervals about kept."""
+        other = copy.copy(self)
+        longer = horizon / float(self.mesh[-1])
+        other._grading, more = 0.0, longer
+        if self._grading > 0.0:
+            other._grading = self._grading + float(np.log(longer))
+            more = min(other._grading / self._grading, longer)
+        n_intervals = int(np.ceil(more * (len(self.mesh) - 1)))
+        other.mesh = graded_mesh(horizon, n_intervals, other._grading)
         return other
 
     def solve(

@@ -107,6 +107,12 @@ class Problem:
         return riccati.gamma_derivative(*self.linearization, self.game, self.P)
 
     @cached_property
+    def decay_rate(self) -> float:
+        """Rate of the slowest mode of the linearised game's closed loop [1/s], positive."""
+        A, B = self.linearization
+        return -float(np.linalg.eigvals(A - B @ self.game.R_eff_inverse @ B.T @ self.P).real.max())
+
+    @cached_property
     def gamma_star(self) -> float:
         """Smallest attenuation level γ* of the linearised game [-]."""
         game = self.game
