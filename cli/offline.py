@@ -26,7 +26,7 @@ def run(options: argparse.Namespace) -> int:
     states = _states(options, scenario)
     station = scenario.station_keeping()
     solver = OfflineSolver(station.problem, scenario.offline)
-    curves = requested_curves(options, station.problem, scenario.offline.horizon)
+    curves = requested_curves(options, station.problem, solver.horizon)
     folder = output_folder(options)
     rows: list[dict[str, Any]] = []
     with progress(options) as tell:
