@@ -89,4 +89,7 @@ class Trajectory:
         """Return v of an interval as a polynomial of degree d - 1."""
         d = self.degree
         here = slice(interval * d, (interval + 1) * d)
-        return BarycentricInterpolator(self.times[1:][here], self.v[here])
+        nodes = self.times[1:][here]
+        # weights of our own: scipy takes the nodes in a random order, and rounds as that comes
+        gaps = (nodes[:, None] - nodes) / (np.ptp(nodes) or 1.0) + np.eye(d)
+        return BarycentricInterpolator(nodes, self.v[here], wi=1.0 / np.prod(gaps, axis=1))
