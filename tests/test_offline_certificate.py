@@ -156,3 +156,27 @@ def test_faults_name_what_breaks_its_tolerance() -> None:
     assert faults[1].startswith("hji_residual is nan")
     assert faults[2].startswith("costate_error is 1.0e-03")
     assert "conjugate point" in faults[3]
+
+
+def test_the_same_state_gives_the_same_bits() -> None:
+    """Whatever was solved before it; the certificate goes through the interpolation of the guess."""
+    problem, _, _ = two_state()
+    solver = OfflineSolver(problem, EASY)
+    first = solver.solve(np.array([1.0, -0.7]))
+    solver.solve(np.array([-0.2, 0.3]))
+    again = solver.solve(np.array([1.0, -0.7]))
+    assert first.certificate == again.certificate
+    np.testing.assert_array_equal(first.direct.trajectory.states, again.direct.trajectory.states)
+
+
+def test_a_guess_leads_to_the_same_optimum() -> None:
+    problem, _, _ = two_state()
+    solver = OfflineSolver(problem, EASY)
+    zeta0 = np.array([1.0, -0.7])
+    cold = solver.solve(zeta0)
+    near = solver.solve(np.array([1.05, -0.7]))
+    for guess in (near.direct.trajectory, cold.direct.trajectory):
+        warm = solver.solve(zeta0, guess)
+        assert warm.value == pytest.approx(cold.value, rel=1e-12)
+        assert warm.faults == []
+    assert warm.direct.iterations < cold.direct.iterations, "its own optimum leaves nothing to do"
