@@ -3,68 +3,93 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from ..comparison.gamma_figure import draw_gamma_curves
-from ..offline import GammaCurveSolver
+from ..offline import GammaCurve, GammaCurveSolver
 from ..symbolic import InputError, Problem
-from .output import Tell, print_table
+from .output import print_table, progress
 
+SHOWN = 9  # states whose curves are drawn and printed
 POINT = ("gamma", "value", "linear_value", "slope")
 
 
-def requested_curves(
-    options: argparse.Namespace, problem: Problem, horizon: float
-) -> GammaCurveSolver | None:
-    """Return the solver of the levels that were asked for, or None.
+class Curves:
+    """The curves of all states, if levels were asked for.
+
+    Parameters
+    ----------
+    options : with `gammas`, levels or the word "grid", or None
+    horizon : [s]
 
     Raises
     ------
     InputError
-        If one is not a number or does not exceed the threshold; the message names γ*.
+        If a level is not a number or does not exceed the threshold; the message names γ*.
     """
-    text: str | None = options.gammas
-    if text is None:
-        return None
+
+    def __init__(self, options: argparse.Namespace, problem: Problem, horizon: float) -> None:
+        self._options = options
+        self._lines: list[list[str]] = []
+        self._limits: list[str] = []
+        self._curves: list[GammaCurve] = []
+        self._solver: GammaCurveSolver | None = None
+        text: str | None = options.gammas
+        if text is not None:
+            self._solver = GammaCurveSolver(problem, _levels(text), horizon=horizon)
+
+    def each(self, rows: Iterable[dict[str, Any]], n_rows: int) -> Iterator[dict[str, Any]]:
+        """Yield the rows with `gamma_curve` and `undisturbed_value` added."""
+        if self._solver is None:
+            yield from rows
+            return
+        with progress(self._options) as tell:
+            for i, row in enumerate(rows):
+                tell("values against gamma", i / n_rows)
+                yield row | self._row(self._solver, i, row)
+
+    def _row(self, solver: GammaCurveSolver, i: int, row: dict[str, Any]) -> dict[str, Any]:
+        curve = solver.solve(row["zeta"])
+        points = [{name: getattr(point, name) for name in POINT} for point in curve.points]
+        limit = curve.undisturbed.value
+        if i < SHOWN:
+            self._curves.append(curve)
+            self._lines += [[str(i + 1), *(_number(p[name]) for name in POINT)] for p in points]
+            self._limits.append(_number(limit))
+        return {
+            "gamma_curve": points,
+            "undisturbed_value": limit,
+            "faults": [*row["faults"], *curve.faults],
+        }
+
+    def draw(self, folder: Path) -> None:
+        """Draw the first curves in one figure; nothing if there are none."""
+        if self._curves:
+            draw_gamma_curves(folder / "gamma-curve.png", self._curves)
+
+    def show(self) -> None:
+        """Print the first curves as a table; nothing if there are none."""
+        if not self._lines:
+            return
+        header = ["state", "gamma", "value", "linear", "dV/dgamma"]
+        print_table("Value against gamma", header, self._lines)
+        limits = ", ".join(self._limits)
+        print(f"without disturbance (gamma infinite): {limits}; figure: gamma-curve.png")
+
+
+def _levels(text: str) -> list[float] | None:
     if text.strip() == "grid":
-        return GammaCurveSolver(problem, horizon=horizon)
+        return None
     try:
-        gammas = [float(part) for part in text.split(",")]
+        return [float(part) for part in text.split(",")]
     except ValueError:
         raise InputError(
             f"--gammas {text}: give numbers with commas between, for instance 1.2,1.5,2,3, "
             "or the word 'grid'"
         ) from None
-    return GammaCurveSolver(problem, gammas, horizon=horizon)
 
 
-def add_curves(
-    solver: GammaCurveSolver | None, rows: list[dict[str, Any]], folder: Path, tell: Tell
-) -> None:
-    """Add `gamma_curve` and `undisturbed_value` to each row, and draw all curves in one figure."""
-    if solver is None:
-        return
-    curves = []
-    for i, row in enumerate(rows):
-        tell("values against gamma", i / len(rows))
-        curve = solver.solve(row["zeta"])
-        row["gamma_curve"] = [{name: getattr(p, name) for name in POINT} for p in curve.points]
-        row["undisturbed_value"] = curve.undisturbed.value
-        row["faults"] = [*row["faults"], *curve.faults]
-        curves.append(curve)
-    draw_gamma_curves(folder / "gamma-curve.png", curves)
-
-
-def print_curves(rows: list[dict[str, Any]]) -> None:
-    """Print the curves as a table; nothing if there are none."""
-    lines = [
-        [str(i + 1), *(f"{point[name]:.8g}" for name in POINT)]
-        for i, row in enumerate(rows)
-        for point in row.get("gamma_curve", [])
-    ]
-    if not lines:
-        return
-    print_table("Value against gamma", ["state", "gamma", "value", "linear", "dV/dgamma"], lines)
-    limits = ", ".join(f"{row['undisturbed_value']:.8g}" for row in rows)
-    print(f"without disturbance (gamma infinite): {limits}; figure: gamma-curve.png")
+def _number(value: float) -> str:
+    return f"{value:.8g}"

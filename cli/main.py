@@ -49,6 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with interrupt.remembered():
             return _run(options)
+    except BrokenPipeError:  # what reads our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
     except KeyboardInterrupt:
         print("stationkeep: interrupted; what was finished is kept", file=sys.stderr)
         return 1
@@ -114,16 +117,7 @@ def parser() -> argparse.ArgumentParser:
                 help="don't compile, use CasADi's virtual machine",
             )
         if name == "offline":
-            command.add_argument(
-                "--state",
-                action="append",
-                metavar="X,Y,Z,PHI,...",
-                help="initial state, 12 numbers [m, rad, m/s, rad/s] (repeatable)",
-            )
-            command.add_argument(
-                "--states", type=Path, metavar="FILE", help=".npy or CSV file of rows of 12 numbers"
-            )
-            command.add_argument("--gammas", metavar="G,G,...", help=GAMMAS_HELP)
+            _offline_options(command)
         if name == "compare":
             command.add_argument(
                 "--n-states",
@@ -133,6 +127,25 @@ def parser() -> argparse.ArgumentParser:
                 help="compare from N states: the scenario's and N - 1 random ones of the envelope",
             )
     return top
+
+
+def _offline_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--state",
+        action="append",
+        metavar="X,Y,Z,PHI,...",
+        help="initial state, 12 numbers [m, rad, m/s, rad/s] (repeatable)",
+    )
+    command.add_argument(
+        "--states", type=Path, metavar="FILE", help=".npy or CSV file of rows of 12 numbers"
+    )
+    command.add_argument("--gammas", metavar="G,G,...", help=GAMMAS_HELP)
+    command.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes that solve at the same time (default: as many as there are cores)",
+    )
 
 
 def _common_options(command: argparse.ArgumentParser) -> None:

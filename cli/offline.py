@@ -4,144 +4,181 @@ from __future__ import annotations
 
 import argparse
 import csv
+import time
+from collections.abc import Iterable, Iterator
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..comparison import Scenario
-from ..comparison.runs import optimal_record
-from ..offline import OfflineSolver
-from ..symbolic import InputError, RunError, require_state
-from ..symbolic.vehicle import Array
-from .gamma import add_curves, print_curves, requested_curves
-from .output import load_scenario, output_folder, print_json, print_table, progress, write_json
+from ..comparison.lock import locked
+from ..comparison.optima import CERTIFICATE, Optima
+from ..comparison.pool import default_workers
+from ..offline import horizon_of
+from ..online.closed_loop import STATE_NAMES
+from ..online.record import FORCE_NAMES, remove_temporaries, written_whole
+from ..symbolic import InputError
+from .gamma import Curves
+from .output import (
+    Tell,
+    load_scenario,
+    output_folder,
+    print_file,
+    print_table,
+    progress,
+    write_json_rows,
+)
+from .states import initial_states
 
-CERTIFICATE = ("value_error", "defect", "hji_residual", "costate_error", "horizon_error")
+SHOWN = 10  # states in the printed table
+SHOWN_ERRORS = (
+    "value_error",
+    "disagreement",
+    "horizon_error",
+    "defect",
+    "hji_residual",
+    "costate_error",
+)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve from every state, write the records and print values with their certificates."""
+    """Solve from every state, write records and tables and print values with their certificates."""
+    workers = default_workers() if options.workers is None else options.workers
+    if workers < 1:
+        raise InputError(f"--workers is {workers}, but must be at least 1")
     scenario = load_scenario(options)
-    states = _states(options, scenario)
-    station = scenario.station_keeping()
-    solver = OfflineSolver(station.problem, scenario.offline)
-    curves = requested_curves(options, station.problem, solver.horizon)
+    states = np.array(initial_states(options, scenario))
+    problem = scenario.station_keeping().problem
+    curves = Curves(options, problem, horizon_of(problem, scenario.offline))
     folder = output_folder(options)
-    rows: list[dict[str, Any]] = []
-    with progress(options) as tell:
-        for i, zeta0 in enumerate(states):
-            tell("offline optima", i / len(states))
-            rows.append(_solve(scenario, solver, folder, zeta0, i))
-        add_curves(curves, rows, folder, tell)
-    linear = {"P": station.problem.P, "gamma_star": station.problem.gamma_star}
-    answer = {"states": rows, "linear": linear}
-    write_json(folder / "offline.json", answer)
+    with locked(folder):
+        remove_temporaries(folder, "offline.*")
+        optima = Optima(scenario, states, folder)
+        given_up = solve(options, optima, workers, "offline optima")
+        told = Told()
+        linear = {"P": problem.P, "gamma_star": problem.gamma_star}
+        rows = curves.each(optima.rows(given_up), len(states))
+        rows = told.each(_into_csv(folder / "offline.csv", rows))
+        write_json_rows(folder / "offline.json", "states", rows, {"linear": linear})
+        curves.draw(folder)
     if options.json:
-        print_json(answer)
+        print_file(folder / "offline.json")
     else:
-        _print(rows, station.problem.gamma_star, folder)
-        print_curves(rows)
-    return 1 if any(row["faults"] for row in rows) else 0
+        told.show()
+        curves.show()
+        print(f"gamma* of the linearised game: {problem.gamma_star:.6g}; records: {folder}")
+    return 1 if told.faulty else 0
 
 
-def _solve(
-    scenario: Scenario, solver: OfflineSolver, folder: Path, zeta0: Array, index: int
-) -> dict[str, Any]:
-    station = scenario.station_keeping()
-    try:
-        record = optimal_record(scenario, solver, folder / f"optimal-{index + 1}.nc", zeta0)
-    except RunError as error:
-        return {
-            "zeta": zeta0,
-            "value": None,
-            "costate": None,
-            "u_control": None,
-            "u_disturbance": None,
-            "certificate": dict.fromkeys(CERTIFICATE),
-            "iterations": None,
-            "seconds": None,
-            "faults": [str(error)],
-        }
-    costate = record["costate"].values
-    g = solver.direct.plant.terms(zeta0)[1]
-    u_control, u_disturbance = station.game.policies(g, costate)
-    faults = str(record.attrs["faults"])
-    return {
-        "zeta": zeta0,
-        "value": float(record.attrs["value"]),
-        "costate": costate,
-        "u_control": u_control,
-        "u_disturbance": u_disturbance,
-        "certificate": {name: float(record.attrs[name]) for name in CERTIFICATE},
-        "iterations": int(record.attrs["iterations"]),
-        "seconds": float(record.attrs["seconds"]),
-        "certified_seconds": float(record.attrs["certified_seconds"]),
-        "faults": faults.split("; ") if faults else [],
-    }
+def solve(options: argparse.Namespace, optima: Optima, workers: int, stage: str) -> dict[int, str]:
+    """Solve with progress on stderr; return the states that were given up, and why."""
+    with progress(options) as tell:
+        tell(stage, 0.0)
+        return optima.solve(workers, _Rate(tell, stage, len(optima.states)))
 
 
-def _states(options: argparse.Namespace, scenario: Scenario) -> list[Array]:
-    """Return the initial states of the command line, or the scenario's."""
-    states = [require_state(_parse(text)) for text in options.state or []]
-    if options.states is not None:
-        states += _read(options.states)
-    return states or [scenario.initial_state]
+class _Rate:
+    """Progress of many solves: how fast it goes and what time is left."""
+
+    def __init__(self, tell: Tell, stage: str, n: int) -> None:
+        self.tell = tell
+        self.stage = stage
+        self.n = n
+        self.started = time.monotonic()
+
+    def __call__(self, done: int, solved: int) -> None:
+        """Tell that `done` states are there, `solved` of them made in this run."""
+        note = f"{done} of {self.n}"
+        if solved:
+            rate = solved / (time.monotonic() - self.started)
+            left = timedelta(seconds=round((self.n - done) / rate))
+            note += f", {rate:.2g}/s, {left} left"
+        self.tell(self.stage, done / self.n, note)
 
 
-def _parse(text: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(
-            f"--state {text}: give 12 numbers with commas between, "
-            "x,y,z,phi,theta,psi and their rates [m, rad, m/s, rad/s]"
-        ) from None
+class Told:
+    """What is printed of many rows: the first ones, those with faults, and how many of each.
 
+    Attributes
+    ----------
+    n, faulty : numbers of states, and of those with faults
+    """
 
-def _read(path: Path) -> list[Array]:
-    """Read rows of 12 numbers from a .npy or CSV file."""
-    needed = "give rows of 12 numbers, as .npy or with commas between"
-    try:
-        table = np.load(path, allow_pickle=False) if path.suffix == ".npy" else _read_csv(path)
-    except FileNotFoundError:
-        raise InputError(f"there is no file '{path}'; {needed}") from None
-    except IsADirectoryError:
-        raise InputError(f"'{path}' is a folder; {needed}") from None
-    except (OSError, ValueError, EOFError):
-        raise InputError(f"'{path}' can't be read as states; {needed}") from None
-    if table.ndim == 1:
-        table = table[None, :]
-    if table.dtype.kind not in "fiu" or table.ndim != 2 or table.shape[1] != 12 or not len(table):
-        raise InputError(f"'{path}' holds an array of shape {table.shape}; {needed}")
-    rows = []
-    for i, row in enumerate(table):
-        try:
-            rows.append(require_state(row))
-        except InputError as error:
-            raise InputError(f"'{path}', row {i + 1}: {error}") from None
-    return rows
+    def __init__(self) -> None:
+        self.n = 0
+        self.faulty = 0
+        self.rows: list[tuple[int, dict[str, Any]]] = []
 
+    def each(self, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+        """Yield the rows, and remember what will be shown of them."""
+        faults: list[tuple[int, dict[str, Any]]] = []
+        for row in rows:
+            self.n += 1
+            self.faulty += bool(row["faults"])
+            if len(self.rows) < SHOWN:
+                self.rows.append((self.n, row))
+            elif row["faults"] and len(faults) < SHOWN:
+                faults.append((self.n, row))
+            yield row
+        self.rows += faults
 
-def _read_csv(path: Path) -> Array:
-    with path.open(encoding="utf-8", newline="") as file:
-        return np.array([[float(cell) for cell in row] for row in csv.reader(file) if row])
-
-
-def _print(rows: list[dict[str, Any]], gamma_star: float, folder: Path) -> None:
-    print_table(
-        "Offline optima",
-        ["state", "value", *CERTIFICATE, "iterations", "solve [s]", "certified"],
-        [
+    def show(self) -> None:
+        """Print the table."""
+        print_table(
+            "Offline optima",
             [
-                np.array2string(row["zeta"], precision=3, suppress_small=True, max_line_width=200),
-                "–" if row["value"] is None else f"{row['value']:.8g}",
-                *("–" if v is None else f"{v:.1e}" for v in row["certificate"].values()),
-                "–" if row["iterations"] is None else str(row["iterations"]),
-                "–" if row["seconds"] is None else f"{row['seconds']:.2f}",
-                "; ".join(row["faults"]) or "yes",
-            ]
-            for row in rows
-        ],
-    )
-    print(f"gamma* of the linearised game: {gamma_star:.6g}; records: {folder}")
+                "",
+                "state",
+                "value",
+                *(name.replace("_", " ") for name in SHOWN_ERRORS),
+                "solve [s]",
+                "certified",
+            ],
+            [[str(number), *_cells(row)] for number, row in self.rows],
+        )
+        if self.n > len(self.rows):
+            print(f"{self.n - len(self.rows)} more states are in offline.csv")
+        if self.n > 1:
+            print(f"{self.n - self.faulty} of {self.n} states are certified")
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    return [
+        " ".join(f"{entry:.3g}" for entry in row["zeta"]),
+        "–" if row["value"] is None else f"{row['value']:.8g}",
+        *(_error(row["certificate"][name]) for name in SHOWN_ERRORS),
+        "–" if row["seconds"] is None else f"{row['seconds']:.2f}",
+        "; ".join(row["faults"]) or _verdict(row),
+    ]
+
+
+def _error(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1e}"
+
+
+def _verdict(row: dict[str, Any]) -> str:
+    """Return that the state is certified, and how many other extremals there are."""
+    if not row["certificate"]["gradient_unique"]:
+        return "yes; its gradient is not unique"
+    others = len(row["extremals"])
+    return f"yes; the lowest of {others + 1} extremals" if others else "yes"
+
+
+def _into_csv(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Yield the rows and write each to a table, its numbers exact; an unknown number is left empty."""
+    vectors: dict[str, tuple[str, ...]] = {"zeta": STATE_NAMES, "costate": STATE_NAMES}
+    vectors |= {"u_control": FORCE_NAMES, "u_disturbance": FORCE_NAMES}
+    numbers = ("value", *CERTIFICATE, "iterations", "seconds", "certified_seconds")
+    heads = [f"{name}_{part}" for name, parts in vectors.items() for part in parts]
+    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file)
+        table.writerow([*heads, *numbers, "faults"])
+        for row in rows:
+            flat = row | row["certificate"]
+            cells: list[Any] = []
+            for name, parts in vectors.items():
+                cells += [""] * len(parts) if row[name] is None else row[name].tolist()
+            cells += ["" if flat[name] is None else flat[name] for name in numbers]
+            table.writerow([*cells, "; ".join(row["faults"])])
+            yield row

@@ -7,6 +7,7 @@ import json
 import math
 import sys
 import tempfile
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,15 +20,17 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ..comparison import Scenario
-from ..online.record import write_text
+from ..online.record import write_text, written_whole
 from ..symbolic import InputError
 from . import interrupt
 
+SECONDS_BETWEEN_NOTES = 10.0
+
 
 class Tell(Protocol):
-    """Show the name of the present stage and the part of it that is done, 0 to 1."""
+    """Show the name of the present stage, the part of it that is done, 0 to 1, and a note on it."""
 
-    def __call__(self, stage: str, part: float) -> None:
+    def __call__(self, stage: str, part: float, note: str = "") -> None:
         """Update the progress line."""
         ...
 
@@ -72,6 +75,7 @@ def progress(options: argparse.Namespace) -> Iterator[Tell]:
         BarColumn(),
         TextColumn("{task.percentage:>3.0f} %"),
         TimeElapsedColumn(),
+        TextColumn("{task.fields[note]}"),
     )
     console = Console(stderr=True)
     if not console.is_terminal or options.quiet:
@@ -80,31 +84,36 @@ def progress(options: argparse.Namespace) -> Iterator[Tell]:
     with Progress(*columns, console=console, transient=True) as bar:
         tasks: dict[str, Any] = {}
 
-        def tell(stage: str, part: float) -> None:
+        def tell(stage: str, part: float, note: str = "") -> None:
             interrupt.check()
             if stage not in tasks:
                 for task in tasks.values():
                     bar.update(task, completed=1.0)
-                tasks[stage] = bar.add_task(stage, total=1.0)
-            bar.update(tasks[stage], completed=part)
+                tasks[stage] = bar.add_task(stage, total=1.0, note=note)
+            bar.update(tasks[stage], completed=part, note=note)
 
         yield tell
 
 
-def _silent(stage: str, part: float) -> None:
+def _silent(stage: str, part: float, note: str = "") -> None:
     """Show nothing."""
     interrupt.check()
 
 
 def _line_by_line() -> Tell:
-    """Return what shows each new stage as a line, where there is no terminal to draw on."""
-    seen: set[str] = set()
+    """Return what shows each new stage, and now and then its note, where there is no terminal."""
+    shown: dict[str, float] = {}
 
-    def tell(stage: str, part: float) -> None:
+    def tell(stage: str, part: float, note: str = "") -> None:
         interrupt.check()
-        if stage not in seen:
-            seen.add(stage)
+        now = time.monotonic()
+        if stage not in shown:
             print(f"stationkeep: {stage} ...", file=sys.stderr, flush=True)
+        elif note and now - shown[stage] > SECONDS_BETWEEN_NOTES:
+            print(f"stationkeep: {stage}: {note}", file=sys.stderr, flush=True)
+        else:
+            return
+        shown[stage] = now
 
     return tell
 
@@ -117,6 +126,28 @@ def print_json(data: dict[str, Any]) -> None:
 def write_json(path: Path, data: dict[str, Any]) -> None:
     """Write what `print_json` prints to a file, indented; raises as `written_whole`."""
     write_text(path, json.dumps(plain(data), indent=1))
+
+
+def write_json_rows(
+    path: Path, name: str, rows: Iterable[dict[str, Any]], rest: dict[str, Any]
+) -> None:
+    """Write {name: [rows ...], **rest} as `write_json` would, a row at a time, a line each."""
+    with written_whole(path) as temporary, temporary.open("w", encoding="utf-8") as file:
+        file.write(f"{{{json.dumps(name)}: [")
+        for i, row in enumerate(rows):
+            file.write((",\n" if i else "\n") + json.dumps(plain(row)))
+        file.write("\n]")
+        for key, value in rest.items():
+            file.write(f",\n{json.dumps(key)}: {json.dumps(plain(value))}")
+        file.write("}\n")
+
+
+def print_file(path: Path) -> None:
+    """Print a JSON file as `print_json` prints an object, on one line."""
+    with path.open(encoding="utf-8") as file:
+        for line in file:
+            sys.stdout.write(line.rstrip("\n"))
+    print()
 
 
 def plain(value: Any) -> Any:

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ..offline import OfflineSolution, OfflineSolver
+from ..offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
 from ..online import Policy, load, run, save, to_dataset
 from ..online.closed_loop import STATE_NAMES, Progress
 from ..online.record import versions
-from ..symbolic import InputError
+from ..symbolic import InputError, RunError
 from ..symbolic.vehicle import Array
 from .scenario import Scenario
 
-FORMAT = 1  # of the records; raise it when what is in them, or how a run is made, changes
+FORMAT = 2  # of the records; raise it when what is in them, or how a run is made, changes
 OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
 
 
@@ -78,14 +81,73 @@ def online_record(
 def optimal_record(
     scenario: Scenario, solver: OfflineSolver, path: Path | None = None, zeta0: Array | None = None
 ) -> xr.Dataset:
-    """Return the record of the offline optimum from ζ_0, from `path` if it holds this very solve."""
+    """Return the record of the offline optimum from ζ_0, from `path` if it holds this very solve.
+
+    Raises
+    ------
+    RunError
+        If the solver does not converge; that is kept too.
+    """
     start = scenario.initial_state if zeta0 is None else zeta0
-    attributes = provenance(scenario, f"optimal from {start.tolist()}", OFFLINE_KEY)
+    attributes = optimum_provenance(scenario, start)
+    record = _reuse(
+        path, attributes["key"], lambda: optimum_or_failure(scenario, solver, start, attributes)
+    )
+    if "failed" in record.attrs:
+        raise RunError(str(record.attrs["failed"]))
+    return record
 
-    def make() -> xr.Dataset:
-        return optimum_to_dataset(scenario, solver.solve(start), attributes)
 
-    return _reuse(path, attributes["key"], make)
+def optimum_provenance(scenario: Scenario, zeta0: Array, guess: str = "") -> dict[str, Any]:
+    """Return `provenance` of the optimum from ζ_0; `guess` is the key of the one it starts from."""
+    kind = f"optimal from {zeta0.tolist()}" + (f", started from {guess}" if guess else "")
+    return provenance(scenario, kind, OFFLINE_KEY)
+
+
+def optimum_or_failure(
+    scenario: Scenario,
+    solver: OfflineSolver,
+    zeta0: Array,
+    attributes: dict[str, Any],
+    guess: Trajectory | None = None,
+) -> xr.Dataset:
+    """Return the record of the optimum from ζ_0, or of the solver's failure there.
+
+    A search that fails from `guess` starts again from the linear policy. Where that does not converge
+    either the record holds the reason, `failed`, and no trajectory.
+    """
+    started = time.perf_counter()
+    try:
+        solution = _solve(solver, zeta0, guess)
+    except RunError as error:
+        attributes = {
+            **attributes,
+            **versions(),
+            "failed": str(error),
+            "certified_seconds": time.perf_counter() - started,
+        }
+        return xr.Dataset({"zeta": ("state", zeta0)}, {"state": list(STATE_NAMES)}, attributes)
+    return optimum_to_dataset(scenario, solution, attributes)
+
+
+def _solve(solver: OfflineSolver, zeta0: Array, guess: Trajectory | None) -> OfflineSolution:
+    if guess is not None:
+        with suppress(RunError):
+            solution = solver.solve(zeta0, guess)
+            if not solution.faults:
+                return solution
+    return solver.solve(zeta0)
+
+
+def trajectory_of(record: xr.Dataset) -> Trajectory:
+    """Return the trajectory of an optimum's record, bit for bit the one that was kept."""
+    return Trajectory(
+        mesh=record["mesh"].values,
+        times=record["time"].values,
+        states=record["zeta"].values,
+        v=record["v"].values,
+        degree=int(record.attrs["degree"]),
+    )
 
 
 def optimum_to_dataset(
@@ -107,6 +169,7 @@ def optimum_to_dataset(
         "zeta": (states, path.states, {"units": "m, rad, m/s, rad/s"}),
         "u_control": (forces, u_control, units),
         "u_disturbance": (forces, u_disturbance, units),
+        "v": (forces, path.v, units),
         "tau_b": (forces, np.array(tau_b), units),
         "local_cost": (("node",), local, {"units": "cost/s"}),
         "cost": (("time",), path.quadrature(local), {"units": "cost"}),
@@ -115,19 +178,39 @@ def optimum_to_dataset(
     coordinates = {
         "time": ("time", path.times, {"units": "s"}),
         "node": ("node", path.times[1:], {"units": "s"}),
+        "mesh": ("mesh", path.mesh, {"units": "s"}),
         "state": list(STATE_NAMES),
     }
-    attributes = {
-        **attributes,
+    return xr.Dataset(data, coordinates, attributes | _described(solution))
+
+
+def _described(solution: OfflineSolution) -> dict[str, Any]:
+    """Return what a record's attributes tell of a solution: value, certificate, how it was found."""
+    direct, path = solution.direct, solution.direct.trajectory
+    return {
         **versions(),
         **{name: float(value) for name, value in vars(solution.certificate).items()},
+        "degree": path.degree,
+        "intervals": len(path.mesh) - 1,
+        "rounds": solution.rounds,
+        "method": direct.method,
+        "extremals": json.dumps([_extremal(solution, other) for other in solution.others]),
         "value": direct.value,
         "iterations": direct.iterations,
         "seconds": direct.seconds,
         "certified_seconds": solution.seconds,
         "faults": "; ".join(solution.faults),
     }
-    return xr.Dataset(data, coordinates, attributes)
+
+
+def _extremal(solution: OfflineSolution, other: DirectSolution) -> dict[str, Any]:
+    """Return what is told of a further extremal: by how much it is dearer, relative to the value."""
+    return {
+        "value": other.value,
+        "gap": (other.value - solution.value) / solution.value,
+        "second_order": other.second_order,
+        "costate": other.costate.tolist(),
+    }
 
 
 def _reuse(path: Path | None, key: str, make: Callable[[], xr.Dataset]) -> xr.Dataset:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -143,6 +143,10 @@ class Scenario(Settings):
             changed.__dict__["_station_keeping"] = self._station_keeping
         return changed
 
+    def __reduce__(self) -> tuple[Callable[[str, Path | None], Scenario], tuple[str, Path | None]]:
+        """Pickle as JSON and the scenario's folder: nothing of CasADi can be pickled."""
+        return restored, (self.model_dump_json(), self._folder)
+
     def station_keeping(self) -> StationKeeping:
         """Return vehicle, game and basis, compiled when first used; built once a scenario.
 
@@ -231,6 +235,13 @@ class Scenario(Settings):
             return path
         beside = self._folder / path
         return beside if beside.exists() else path
+
+
+def restored(text: str, folder: Path | None) -> Scenario:
+    """Return the scenario of this JSON, whose relative paths may be meant from `folder`."""
+    scenario = Scenario.model_validate_json(text)
+    scenario._folder = folder
+    return scenario
 
 
 def _override(data: dict[str, Any], text: str) -> None:

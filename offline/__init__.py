@@ -6,7 +6,7 @@ from .gamma_curve import GammaCurve, GammaCurveSolver, GammaPoint, value_against
 from .plant import Plant
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings
-from .solve import OfflineSolution, OfflineSolver, solve
+from .solve import OfflineSolution, OfflineSolver, horizon_of, solve
 from .trajectory import Trajectory
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "SaddleSolution",
     "SaddleSolver",
     "Trajectory",
+    "horizon_of",
     "solve",
     "value_against_gamma",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -60,7 +60,7 @@ class OfflineSolver:
     def __init__(self, problem: Problem, settings: OfflineSettings | None = None) -> None:
         self.problem = problem
         self.settings = OfflineSettings() if settings is None else settings
-        self.horizon = self.settings.horizon or chosen_horizon(problem, self.settings)
+        self.horizon = horizon_of(problem, self.settings)
         self.direct = DirectSolver(
             problem,
             horizon=self.horizon,
@@ -109,7 +109,13 @@ class OfflineSolver:
             ]
             extremals.sort(key=lambda solution: solution.value)
         best = extremals[0]
-        return refine(self.direct, self.settings, best.zeta, best.trajectory), extremals[1:]
+        refined = refine(self.direct, self.settings, best.zeta, best.trajectory)
+        solution = replace(
+            refined.solution,
+            iterations=first.iterations + refined.solution.iterations,
+            seconds=first.seconds + refined.solution.seconds,
+        )
+        return replace(refined, solution=solution), extremals[1:]
 
     def _saddle_point(self, solution: DirectSolution) -> SaddleSolution | None:
         """Return the cheapest saddle point found; from perturbed states too where the first is dearer.
@@ -191,19 +197,18 @@ class OfflineSolver:
         return SaddleSolver(self.problem, horizon=self.horizon)
 
 
-def chosen_horizon(problem: Problem, settings: OfflineSettings) -> float:
-    """Return T [s] after which the slowest mode of the linearised closed loop has decayed enough.
+def horizon_of(problem: Problem, settings: OfflineSettings) -> float:
+    """Return T [s], that of the settings or one after which the closed loop has decayed enough.
 
-    The state falls like e^(-α T), α its slowest rate, and the cost to go like its square; T makes
-    that a hundredth of the requested value error, and the square root of it, what is left in the
-    costate, a hundredth of the requested costate error. Doubling it is part of the certificate.
+    The state falls like e^(-α T), α the slowest rate of the linearised closed loop, and the cost to go
+    like its square; T makes that a hundredth of the requested value error, and of the costate's.
+    Doubling T is part of the certificate.
     """
-    A, B = problem.linearization
-    closed = A - B @ problem.game.R_eff_inverse @ B.T @ problem.P
-    slowest = float(-np.linalg.eigvals(closed).real.max())
+    if settings.horizon is not None:
+        return settings.horizon
     by_value = -np.log(0.01 * settings.value_tolerance) / 2.0
     by_costate = -np.log(0.01 * settings.costate_tolerance) / 2.0
-    return float(max(by_value, by_costate) / slowest)
+    return float(max(by_value, by_costate) / problem.decay_rate)
 
 
 def solve(problem: Problem, zeta0: Array, settings: OfflineSettings | None = None) -> OfflineSolution:

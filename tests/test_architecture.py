@@ -28,7 +28,7 @@ MAY_IMPORT = {
 SOURCES = [path for folder in MAY_IMPORT for path in sorted((ROOT / folder).rglob("*.py"))]
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 # what is installed under another name than it is imported by, or never imported by name
-IMPORTED_AS = {"h5netcdf": None, "h5py": None}
+IMPORTED_AS = {"h5netcdf": None}
 
 
 def name_of(path: Path) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stationkeep.offline import OfflineSolution, OfflineSolver
+from stationkeep.offline import OfflineSolution, OfflineSolver, Trajectory
 from stationkeep.online import load
 from stationkeep.symbolic import RunError
 
@@ -91,14 +91,17 @@ def test_one_state_of_two_that_can_not_be_solved(
 ) -> None:
     original = OfflineSolver.solve
 
-    def solve(self: OfflineSolver, zeta0: Array) -> OfflineSolution:
+    calls = []
+
+    def solve(self: OfflineSolver, zeta0: Array, guess: Trajectory | None = None) -> OfflineSolution:
+        calls.append(zeta0[0])
         if zeta0[0] > 0.5:
             raise RunError("IPOPT stopped with 'Infeasible_Problem_Detected' after 7 iterations")
-        return original(self, zeta0)
+        return original(self, zeta0, guess)
 
     monkeypatch.setattr(OfflineSolver, "solve", solve)
     far, near = ",".join(["0.6", *["0"] * 11]), ",".join(["0.3", *["0"] * 11])
-    words = ("--state", far, "--state", near, *sets(*QUICK, *ROUGH, *LOOSE))
+    words = ("--state", far, "--state", near, "--workers", "1", *sets(*QUICK, *ROUGH, *LOOSE))
     answer = call(capsys, "offline", "--json", "--quiet", *words)
     assert answer.code == 1
     failed, solved = answer.json()["states"]
@@ -108,8 +111,14 @@ def test_one_state_of_two_that_can_not_be_solved(
     assert "Infeasible_Problem_Detected" in failed["faults"][0]
     assert solved["faults"] == []
     assert solved["value"] > 0.0
-    results = [f"results/bluerov2-heavy/{name}" for name in ("offline.json", "optimal-2.nc")]
-    assert files_in(user_folder) == results
+    names = ("offline.csv", "offline.json", "optimal-1.nc", "optimal-2.nc")
+    assert files_in(user_folder) == [f"results/bluerov2-heavy/{name}" for name in names]
+    record = load(user_folder / "results" / "bluerov2-heavy" / "optimal-1.nc")
+    assert record.attrs["failed"] == failed["faults"][0]
+    again = call(capsys, "offline", "--json", "--quiet", *words)
+    assert again.code == 1
+    assert again.out == answer.out
+    assert sorted(calls) == [0.3, 0.6], "a failure is kept like any result"
 
 
 def test_the_station_itself_has_the_value_zero(capsys: Capture) -> None:
