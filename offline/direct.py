@@ -6,7 +6,6 @@ fully actuated; IPOPT also takes over where Newton's method does not converge.
 
 from __future__ import annotations
 
-import contextlib
 import time
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -15,10 +14,12 @@ import numpy as np
 
 from ..symbolic import Problem, RunError, require_state
 from ..symbolic.vehicle import Array
+from .derivatives import PointDerivatives
 from .guess import LinearStart
 from .mesh import aligned_mesh, graded_mesh
 from .newton import StructuredNewton
 from .plant import Plant
+from .stage import single_player
 from .stages import Grid
 from .trajectory import Trajectory
 from .transcription import Transcription
@@ -98,6 +99,7 @@ class DirectSolver:
         usable = method == "newton" and problem.inverse_dynamics is not None
         self._newton = StructuredNewton(problem) if usable else None
         self._start = LinearStart(problem)
+        self._derivatives = PointDerivatives(single_player(problem))
         self._programs: dict[tuple[int, int], Transcription] = {}
 
     def solve(
@@ -108,18 +110,20 @@ class DirectSolver:
         degree: int | None = None,
         guess: Trajectory | None = None,
         verify: bool = True,
+        safety_net: bool = True,
     ) -> DirectSolution:
         """Return the optimum from `zeta0`, started from `guess` or the linear H-infinity policy.
 
         `mesh` and `degree` replace the solver's own. Without `verify` the trajectory is not
-        re-integrated, and defect and reintegrated_value are NaN.
+        re-integrated, and defect and reintegrated_value are NaN; without `safety_net` IPOPT does not
+        take over from Newton's method.
 
         Raises
         ------
         InputError
             If the state is not finite, of the wrong shape or pitched by 90 degrees.
         RunError
-            If IPOPT does not converge; the message holds its status.
+            If the last method tried does not converge.
         """
         zeta0 = require_state(zeta0, self.problem.n_states)
         mesh = self.mesh if mesh is None else mesh
@@ -128,9 +132,11 @@ class DirectSolver:
         found = None
         if self._newton is not None:
             grid = Grid(mesh, degree, self.problem.n_inputs)
-            # what Newton's method does not find is IPOPT's
-            with contextlib.suppress(RunError):
+            try:
                 found = self._by_newton(self._newton, zeta0, grid, guess)
+            except RunError:
+                if not safety_net:
+                    raise
         if found is None:
             found = self._by_ipopt(zeta0, mesh, degree, guess)
         found = replace(found, seconds=time.perf_counter() - started)
@@ -219,37 +225,26 @@ class DirectSolver:
         program = self._program(len(mesh) - 1, degree)
         times = program.times(mesh)
         first = self._start.sample(zeta0, times)[:2] if guess is None else guess.sample(times)
-        answer = program.solver(
-            x0=program.pack(zeta0, *first),
-            p=np.concatenate([zeta0, np.diff(mesh)]),
-            lbg=0.0,
-            ubg=0.0,
-        )
-        statistics = program.solver.stats()
-        if not statistics["success"]:
-            raise RunError(
-                f"IPOPT stopped with '{statistics['return_status']}' after "
-                f"{statistics['iter_count']} iterations from {np.array2string(zeta0, precision=3)}"
-            )
-        states, v = program.unpack(np.array(answer["x"]).ravel())
-        path = Trajectory(mesh, np.append(mesh[0], times), states, v, degree)
+        found = program.solve(zeta0, mesh, *first)
         # IPOPT adds to the Hessian whenever the inertia is not that of a strict minimum
-        added = statistics["iterations"]["regularization_size"]
+        added = program.solver.stats()["iterations"]["regularization_size"]
         return self._solution(
-            path,
-            value=float(answer["f"]),
-            costate=-np.array(answer["lam_g"]).ravel()[: self.problem.n_states],
+            found.path,
+            value=found.cost,
+            costate=-found.multipliers[: self.problem.n_states],
             second_order=not added or added[-1] == 0.0,
             curvature=None,
             hessian=None,
             method="ipopt",
-            iterations=int(statistics["iter_count"]),
+            iterations=found.iterations,
         )
 
     def _program(self, n_intervals: int, degree: int) -> Transcription:
         key = (n_intervals, degree)
         if key not in self._programs:
-            self._programs[key] = Transcription(self.problem, n_intervals, degree)
+            self._programs[key] = Transcription(
+                self._derivatives.stage, n_intervals, degree, derivatives=self._derivatives
+            )
         return self._programs[key]
 
     def _solution(

@@ -32,7 +32,7 @@ def find_extremals(
     for guess in _guesses(direct, first, starts, seed):
         with contextlib.suppress(RunError):
             mesh = first.trajectory.mesh
-            other = direct.solve(first.zeta, mesh=mesh, guess=guess, verify=False)
+            other = direct.solve(first.zeta, mesh=mesh, guess=guess, verify=False, safety_net=False)
             if all(_differ(other, known, direct.problem.scale) for known in found):
                 found.append(other)
     return sorted(found, key=lambda solution: solution.value)
@@ -50,7 +50,7 @@ def _guesses(
         shift = spread * scale * direction
         for start in (first.zeta + shift, first.zeta - shift):
             with contextlib.suppress(RunError, ValueError):
-                yield direct.solve(start, mesh=mesh, verify=False).trajectory
+                yield direct.solve(start, mesh=mesh, verify=False, safety_net=False).trajectory
 
 
 def _differ(one: DirectSolution, other: DirectSolution, scale: Array) -> bool:

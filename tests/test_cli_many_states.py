@@ -196,7 +196,8 @@ def test_states_that_fail_are_rows_and_the_others_are_solved(
     far = np.zeros(12)
     far[0] = 1e4
     np.save("states.npy", np.array([far, 0.1 * HALF_WIDTHS, 1.01 * far]))
-    words = ("offline", "--quiet", "--json", "--states", "states.npy", "--out", "out", *SETTINGS)
+    words: tuple[str, ...] = ("offline", "--quiet", "--json", "--states", "states.npy", "--out", "out")
+    words += (*SETTINGS, *sets("offline.rounds=1", "offline.starts=0"))
     answer = call(capsys, *words, "--workers", "2")
     assert answer.code == 1
     rows = answer.json()["states"]

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from stationkeep.offline import DirectSolution, DirectSolver, Trajectory
 from stationkeep.offline.radau import RadauRule
+from stationkeep.offline.stage import single_player
 from stationkeep.offline.transcription import Transcription
 from stationkeep.symbolic import Problem
 
@@ -215,7 +216,7 @@ def test_running_cost_integrates_to_the_value() -> None:
 
 def test_quadrature_of_a_trajectory_is_exact_for_polynomials() -> None:
     mesh, rule = np.array([0.5, 1.0, 2.5, 3.0]), RadauRule(3)
-    times = Transcription(two_state()[0], 3, 3).times(mesh)
+    times = Transcription(single_player(two_state()[0]), 3, 3).times(mesh)
     path = Trajectory(mesh, np.append(mesh[0], times), np.zeros((10, 2)), np.zeros((9, 1)), 3)
     np.testing.assert_allclose(times[:3], 0.5 + 0.5 * rule.nodes)
     for power in range(3):
