@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stationkeep.offline import Plant, Trajectory
 from stationkeep.offline.mesh import aligned_mesh, graded_mesh
-from stationkeep.offline.transcription import RadauRule
+from stationkeep.offline.radau import RadauRule
 from stationkeep.offline.verification import sign_changes
 from stationkeep.symbolic import Game, Problem
 
