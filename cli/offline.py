@@ -35,7 +35,6 @@ SHOWN = 10  # states in the printed table
 SHOWN_ERRORS = (
     "value_error",
     "disagreement",
-    "horizon_error",
     "defect",
     "hji_residual",
     "costate_error",
