@@ -87,9 +87,18 @@ class Trajectory:
 
     def input_polynomial(self, interval: int) -> BarycentricInterpolator:
         """Return v of an interval as a polynomial of degree d - 1."""
-        d = self.degree
-        here = slice(interval * d, (interval + 1) * d)
-        nodes = self.times[1:][here]
-        # weights of our own: scipy takes the nodes in a random order, and rounds as that comes
-        gaps = (nodes[:, None] - nodes) / (np.ptp(nodes) or 1.0) + np.eye(d)
-        return BarycentricInterpolator(nodes, self.v[here], wi=1.0 / np.prod(gaps, axis=1))
+        here = slice(interval * self.degree, (interval + 1) * self.degree)
+        return _polynomial(self.times[1:][here], self.v[here])
+
+    def state_polynomial(self, interval: int) -> BarycentricInterpolator:
+        """Return the states of an interval as a polynomial of degree d."""
+        here = slice(interval * self.degree, (interval + 1) * self.degree + 1)
+        nodes = self.times[here].copy()
+        nodes[0] = self.mesh[interval]
+        return _polynomial(nodes, self.states[here])
+
+
+def _polynomial(nodes: Array, values: Array) -> BarycentricInterpolator:
+    # weights of our own: scipy takes the nodes in a random order, and rounds as that comes
+    gaps = (nodes[:, None] - nodes) / (np.ptp(nodes) or 1.0) + np.eye(len(nodes))
+    return BarycentricInterpolator(nodes, values, wi=1.0 / np.prod(gaps, axis=1))
