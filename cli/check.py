@@ -6,15 +6,18 @@ import argparse
 from dataclasses import asdict
 
 from ..comparison import check
+from ..comparison.ideal import load_bounds
 from .output import load_scenario, output_folder, print_json, print_table, progress, write_json
 
 
 def run(options: argparse.Namespace) -> int:
     """Print every condition with its value for the scenario."""
     scenario = load_scenario(options)
+    path = options.ideal_weights
+    bounds = None if path is None else load_bounds(scenario, path)
     with progress(options) as tell:
         tell("conditions", 0.0)
-        conditions = check(scenario)
+        conditions = check(scenario, bounds)
     answer = {"conditions": [asdict(condition) for condition in conditions]}
     if options.out is not None:
         write_json(output_folder(options) / "conditions.json", answer)

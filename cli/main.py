@@ -118,6 +118,13 @@ def parser() -> argparse.ArgumentParser:
             )
         if name == "offline":
             _offline_options(command)
+        if name == "check":
+            command.add_argument(
+                "--ideal-weights",
+                type=Path,
+                metavar="FILE",
+                help="ideal-weights.nc of 'offline --ideal-weights', for what needs ε and ε'",
+            )
         if name == "compare":
             command.add_argument(
                 "--n-states",
@@ -145,6 +152,18 @@ def _offline_options(command: argparse.ArgumentParser) -> None:
         type=int,
         metavar="N",
         help="processes that solve at the same time (default: as many as there are cores)",
+    )
+    command.add_argument(
+        "--ideal-weights",
+        type=int,
+        metavar="N",
+        help="fit the basis to the certified optima from N seeded states of the envelope",
+    )
+    command.add_argument(
+        "--held-out",
+        type=int,
+        metavar="M",
+        help="states of their own on which the fit is judged (default: N / 4, at least 10)",
     )
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
-import time
 from collections.abc import Iterable, Iterator
-from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +12,13 @@ import numpy as np
 
 from ..comparison.lock import locked
 from ..comparison.optima import CERTIFICATE, Optima
-from ..comparison.pool import default_workers
 from ..offline import horizon_of
 from ..online.closed_loop import STATE_NAMES
 from ..online.record import FORCE_NAMES, remove_temporaries, written_whole
-from ..symbolic import InputError
 from .gamma import Curves
-from .output import (
-    Tell,
-    load_scenario,
-    output_folder,
-    print_file,
-    print_table,
-    progress,
-    write_json_rows,
-)
+from .ideal_weights import ideal_weights, numbers, show
+from .output import load_scenario, output_folder, print_file, print_table, write_json_rows
+from .solving import n_workers, solve
 from .states import initial_states
 
 SHOWN = 10  # states in the printed table
@@ -43,23 +33,24 @@ SHOWN_ERRORS = (
 
 def run(options: argparse.Namespace) -> int:
     """Solve from every state, write records and tables and print values with their certificates."""
-    workers = default_workers() if options.workers is None else options.workers
-    if workers < 1:
-        raise InputError(f"--workers is {workers}, but must be at least 1")
+    n_workers(options)  # refuses what is no number of workers before anything is done
     scenario = load_scenario(options)
     states = np.array(initial_states(options, scenario))
+    asked = numbers(options, scenario)
     problem = scenario.station_keeping().problem
     curves = Curves(options, problem, horizon_of(problem, scenario.offline))
     folder = output_folder(options)
     with locked(folder):
         remove_temporaries(folder, "offline.*")
         optima = Optima(scenario, states, folder)
-        given_up = solve(options, optima, workers, "offline optima")
+        given_up = solve(options, optima, "offline optima")
+        rest: dict[str, Any] = {"linear": {"P": problem.P, "gamma_star": problem.gamma_star}}
+        if asked is not None:
+            rest["ideal_weights"] = ideal_weights(options, scenario, folder, asked)
         told = Told()
-        linear = {"P": problem.P, "gamma_star": problem.gamma_star}
         rows = curves.each(optima.rows(given_up), len(states))
         rows = told.each(_into_csv(folder / "offline.csv", rows))
-        write_json_rows(folder / "offline.json", "states", rows, {"linear": linear})
+        write_json_rows(folder / "offline.json", "states", rows, rest)
         curves.draw(folder)
     if options.json:
         print_file(folder / "offline.json")
@@ -67,33 +58,9 @@ def run(options: argparse.Namespace) -> int:
         told.show()
         curves.show()
         print(f"gamma* of the linearised game: {problem.gamma_star:.6g}; records: {folder}")
-    return 1 if told.faulty else 0
-
-
-def solve(options: argparse.Namespace, optima: Optima, workers: int, stage: str) -> dict[int, str]:
-    """Solve with progress on stderr; return the states that were given up, and why."""
-    with progress(options) as tell:
-        tell(stage, 0.0)
-        return optima.solve(workers, _Rate(tell, stage, len(optima.states)))
-
-
-class _Rate:
-    """Progress of many solves: how fast it goes and what time is left."""
-
-    def __init__(self, tell: Tell, stage: str, n: int) -> None:
-        self.tell = tell
-        self.stage = stage
-        self.n = n
-        self.started = time.monotonic()
-
-    def __call__(self, done: int, solved: int) -> None:
-        """Tell that `done` states are there, `solved` of them made in this run."""
-        note = f"{done} of {self.n}"
-        if solved:
-            rate = solved / (time.monotonic() - self.started)
-            left = timedelta(seconds=round((self.n - done) / rate))
-            note += f", {rate:.2g}/s, {left} left"
-        self.tell(self.stage, done / self.n, note)
+        if asked is not None:
+            show(rest["ideal_weights"])
+    return 1 if told.faulty or rest.get("ideal_weights", {}).get("faults") else 0
 
 
 class Told:

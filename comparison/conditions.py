@@ -1,7 +1,7 @@
 """The paper's assumptions and conditions, each with its number for a scenario.
 
-Conditions that need numbers which don't exist yet (ε' of Assumption 3) have the value None and say so;
-where a part of such a bound is known, the bound is that part and the note says what is missing.
+Conditions that need sup|ε'| of Assumption 3 take it from ideal weights. Without them such a condition
+has the value None and says so; where a part of its bound is known, the bound is that part.
 """
 
 from __future__ import annotations
@@ -13,9 +13,10 @@ import numpy as np
 from ..online import Learner, draw_samples
 from ..online.samples import regressor_spectrum
 from ..symbolic import StationKeeping
+from .ideal import Bounds
 from .scenario import Scenario
 
-NO_EPSILON = "needs sup|ε'| of Assumption 3, which takes ideal weights from certified values"
+NO_EPSILON = "needs sup|ε'| of Assumption 3: give --ideal-weights"
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,11 @@ class Condition:
     note: str
 
 
-def check(scenario: Scenario) -> list[Condition]:
-    """Return every assumption and condition of the paper with its value for the scenario."""
+def check(scenario: Scenario, bounds: Bounds | None = None) -> list[Condition]:
+    """Return every assumption and condition of the paper with its value for the scenario.
+
+    `bounds` on ε and ε' come from ideal weights, see `comparison.ideal.load_bounds`.
+    """
     station = scenario.station_keeping()
     samples = scenario.samples
     points = draw_samples(station.envelope, samples.number, samples.seed, inner=samples.inner)
@@ -57,9 +61,9 @@ def check(scenario: Scenario) -> list[Condition]:
         _pitch(scenario),
         *_inertia(scenario, station),
         _equilibrium(station),
-        _representation(),
+        _representation(bounds),
         *_samples(scenario, learner),
-        *_gains(scenario, station, learner),
+        *_gains(scenario, station, learner, bounds),
         *_attenuation(station),
     ]
 
@@ -124,15 +128,17 @@ def _equilibrium(station: StationKeeping) -> Condition:
     return Condition("f(0) = 0", "Assumption 2", residual, 0.0, residual < 1e-9, note)
 
 
-def _representation() -> Condition:
+def _representation(bounds: Bounds | None) -> Condition:
+    smooth = "σ is smooth, so bounded on χ, though not on R^12 as printed; "
+    value, holds, numbers = None, None, "sup|ε| and sup|ε'|: give --ideal-weights"
+    if bounds is not None:
+        value, holds = bounds.epsilon, True
+        numbers = (
+            f"sup|ε| with sup|ε'| = {bounds.epsilon_prime:.4g}, as {bounds.n_states} states of the "
+            "envelope show them"
+        )
     return Condition(
-        "V = W'σ + ε with bounded ε, ε'",
-        "Assumption 3",
-        None,
-        None,
-        None,
-        "σ is smooth, so bounded on χ, though not on R^12 as printed; sup|ε| and sup|ε'| take ideal "
-        "weights from certified values",
+        "V = W'σ + ε with bounded ε, ε'", "Assumption 3", value, None, holds, smooth + numbers
     )
 
 
@@ -174,7 +180,10 @@ def _samples(scenario: Scenario, learner: Learner) -> list[Condition]:
     ]
 
 
-def _gains(scenario: Scenario, station: StationKeeping, learner: Learner) -> list[Condition]:
+def _gains(
+    scenario: Scenario, station: StationKeeping, learner: Learner, bounds: Bounds | None
+) -> list[Condition]:
+    """(24) and (25) share a free ε > 0: (24) is looked at with the least that (25) admits, and back."""
     settings = scenario.learner
     lipschitz = drift_bound(station, max(scenario.samples.number, 500))
     gain = settings.gain_critic
@@ -183,24 +192,36 @@ def _gains(scenario: Scenario, station: StationKeeping, learner: Learner) -> lis
     margin = learner.rank_margin()
     q_lower = float(np.linalg.eigvalsh(station.game.Q).min())
     fails = margin <= known
+    first, second, holds = None, known, False if fails else None
+    first_note = NO_EPSILON
+    if bounds is not None:
+        largest = 2.0 * q_lower / (gain * lipschitz * bounds.epsilon_prime) if gain > 0.0 else np.inf
+        first_note = f"it holds for ε < {largest:.3g}, but no ε satisfies (25)"
+    second_note = "the bound is its known part (η_a1 + η_a2) / (2 η_c)"
+    second_note += "; it fails even with ε' = 0" if fails else f"; {NO_EPSILON}"
+    if bounds is not None and not fails:
+        # ε = L_f sup|ε'| / (2 (c - known)) from (25) in (24), and ε = 2 q / (η_c L_f sup|ε'|) back
+        product = gain * (lipschitz * bounds.epsilon_prime) ** 2 / 4.0
+        first, second = product / (margin - known), known + product / q_lower
+        holds = margin > second
+        first_note, second_note = "with the least ε of (25)", "with the largest ε of (24)"
+    gradient_only = "" if settings.rule == "gradient" else "; derived for the gradient law only"
     return [
         Condition(
             "q_lower > η_c L_f sup|ε'| ε / 2",
             "(24)",
             q_lower,
-            None,
-            None,
-            f"λ_min(Q); η_c = {gain:g}, L_f = {lipschitz:.4g} = sup|f|/|ζ| over samples; {NO_EPSILON}",
+            first,
+            None if first is None else q_lower > first,
+            f"λ_min(Q); η_c = {gain:g}, L_f = {lipschitz:.4g} = sup|f|/|ζ| over samples; {first_note}",
         ),
         Condition(
             "c_lower > L_f sup|ε'| / (2 ε) + (η_a1 + η_a2) / (2 η_c)",
             "(25)",
             margin,
-            known,
-            False if fails else None,
-            "the bound is its known part (η_a1 + η_a2) / (2 η_c)"
-            + ("; it fails even with ε' = 0" if fails else f"; {NO_EPSILON}")
-            + ("" if settings.rule == "gradient" else "; derived for the gradient law only"),
+            second,
+            holds,
+            second_note + gradient_only,
         ),
     ]
 

@@ -138,20 +138,25 @@ def read_parts(path: Path, *names: str) -> tuple[dict[str, Any], dict[str, Array
 
 
 def load_weights(path: Path) -> Array:
-    """Return the last critic weights of a record, shape (m,).
+    """Return the ideal weights of a record, or the last critic weights of a run, shape (m,).
 
     Raises
     ------
     InputError
-        If the file is not a record of a learner.
+        If the file is neither.
     """
     dataset = load(path)
-    if "critic" not in dataset or dataset.sizes.get("learn_time", 0) == 0:
-        raise InputError(f"'{path}' holds no learned weights; give the record of an online run")
-    weights = np.asarray(dataset["critic"].values[-1], dtype=np.float64)
+    if "ideal_weights" in dataset:
+        weights = dataset["ideal_weights"].values
+    elif "critic" in dataset and dataset.sizes.get("learn_time", 0) > 0:
+        weights = dataset["critic"].values[-1]
+    else:
+        raise InputError(
+            f"'{path}' holds no learned weights; give the record of an online run or of ideal weights"
+        )
     if not np.all(np.isfinite(weights)):
         raise InputError(f"the last weights of '{path}' are not finite; give the record of another run")
-    return weights
+    return np.asarray(weights, dtype=np.float64)
 
 
 @contextmanager
