@@ -1,6 +1,6 @@
 """Evidence for the offline optimum: certificates, agreement, several extremals, and its speed.
 
-    python benchmarks/optimum.py [--states 50] [--only exact certificates speed]
+    python benchmarks/optimum.py [--states 50] [--only exact certificates saddle speed]
 
 Prints for each part what is measured; a failed certificate is a row with its reason, not dropped.
 Seeds are fixed. Speeds are medians in one process with one thread.
@@ -18,7 +18,16 @@ import time
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.offline import DirectSolver, OfflineSettings, OfflineSolver, SaddleSolver
+from stationkeep.offline import (
+    BestResponse,
+    ControlPolicy,
+    DirectSolver,
+    OfflineSettings,
+    OfflineSolver,
+    SaddleSolver,
+    WorstCaseSolver,
+    linear_policy,
+)
 from stationkeep.symbolic import Problem, closed_form_problem
 from stationkeep.symbolic.vehicle import Array
 
@@ -117,6 +126,34 @@ def mirrored(problem: Problem, solver: OfflineSolver) -> None:
         )
 
 
+def saddle(_: int) -> None:
+    """Best responses of both players to the other's feedback, and the linear policy's worst case."""
+    problem = reference()
+    direct = DirectSolver(problem, horizon=120.0, n_intervals=40, degree=5)
+    best = BestResponse(problem)
+    worst = WorstCaseSolver(ControlPolicy(problem, linear_policy(problem)))
+    print(
+        "\nSaddle from both sides, relative to V, and the linear policy against its worst disturbance"
+    )
+    print(f"  {'':<4}{'V':>10}{'upper - V':>12}{'V - lower':>12}{'strict':>8}", end="")
+    print(f"{'worst cost above V':>20}{'re-integrated':>15}")
+    for i, zeta in enumerate(envelope_states(problem, 10)):
+        solution, _ = direct.solve_aligned(zeta, verify=False)
+        value = solution.value
+        found = best.solve(zeta, value, solution.trajectory)
+        case = worst.solve(zeta)
+        print(
+            f"  {i:<4}{value:>10.3f}{found.upper / value - 1:>12.1e}{1 - found.lower / value:>12.1e}"
+            f"{found.holds!s:>8}",
+            end="",
+        )
+        if case.unbounded is None:
+            print(f"{100 * case.excess(value):>18.2f} %{abs(case.reintegrated / case.cost - 1):>15.1e}")
+        else:
+            print(f"  unbounded: {case.unbounded}")
+    print(f"  L2 gain of the linear policy, linearised: {worst.policy.l2_gain:.6f} (gamma is 2)")
+
+
 def speed(_: int) -> None:
     """A re-solve from a new state on a coarse mesh, by both methods, and a certified one."""
     problem = reference()
@@ -154,7 +191,7 @@ def speed(_: int) -> None:
         print(f"  certified, {method:<8} median {statistics.median(times):.2f} s of 10 states")
 
 
-PARTS = {"exact": exact, "certificates": certificates, "speed": speed}
+PARTS = {"exact": exact, "certificates": certificates, "saddle": saddle, "speed": speed}
 
 
 def main() -> None:

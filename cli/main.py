@@ -148,6 +148,11 @@ def _offline_options(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--gammas", metavar="G,G,...", help=GAMMAS_HELP)
     command.add_argument(
+        "--saddle",
+        action="store_true",
+        help="also the best responses of both players, and the linear policy's worst case",
+    )
+    command.add_argument(
         "--workers",
         type=int,
         metavar="N",

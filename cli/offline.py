@@ -18,6 +18,7 @@ from ..online.record import FORCE_NAMES, remove_temporaries, written_whole
 from .gamma import Curves
 from .ideal_weights import ideal_weights, numbers, show
 from .output import load_scenario, output_folder, print_file, print_table, write_json_rows
+from .saddle import Saddle
 from .solving import n_workers, solve
 from .states import initial_states
 
@@ -39,6 +40,7 @@ def run(options: argparse.Namespace) -> int:
     asked = numbers(options, scenario)
     problem = scenario.station_keeping().problem
     curves = Curves(options, problem, horizon_of(problem, scenario.offline))
+    saddle = Saddle(options, problem)
     folder = output_folder(options)
     with locked(folder):
         remove_temporaries(folder, "offline.*")
@@ -49,6 +51,7 @@ def run(options: argparse.Namespace) -> int:
             rest["ideal_weights"] = ideal_weights(options, scenario, folder, asked)
         told = Told()
         rows = curves.each(optima.rows(given_up), len(states))
+        rows = saddle.each(rows, folder, len(states))
         rows = told.each(_into_csv(folder / "offline.csv", rows))
         write_json_rows(folder / "offline.json", "states", rows, rest)
         curves.draw(folder)
@@ -57,6 +60,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         told.show()
         curves.show()
+        saddle.show()
         print(f"gamma* of the linearised game: {problem.gamma_star:.6g}; records: {folder}")
         if asked is not None:
             show(rest["ideal_weights"])
