@@ -10,7 +10,13 @@ from numpy.typing import ArrayLike
 from ..symbolic import InputError, StationKeeping, require_state
 from ..symbolic.vehicle import Array
 from .learner import Learner, LearnerStep
-from .samples import draw_samples
+from .samples import (
+    FixedSamples,
+    SampleStrategy,
+    ShrinkingSamples,
+    TrajectorySamples,
+    draw_samples,
+)
 from .settings import LearnerSettings, SampleSettings
 
 
@@ -76,21 +82,18 @@ class Controller:
                 "earth frame so that its x axis is the heading to hold, and the current with it"
             )
         self.learn = learn
-        samples = scenario.samples
-        points = draw_samples(
-            self.setup.envelope, samples.number if learn else 0, samples.seed, inner=samples.inner
-        )
         self.learner = Learner(
             self.setup.problem,
             self.setup.basis,
             scenario.learner,
-            points,
+            sample_strategy(scenario.samples, self.setup) if learn else np.zeros((0, 12)),
             self.setup.riccati_weights,
             scenario.initial_weights(),
             self.setup.functions,
+            scenario.samples,
         )
         self.period = scenario.learner.period
-        self._since = 0.0
+        self._since: float | None = None
         self.last_step: LearnerStep | None = None
         self.zeta = np.zeros(12)
         self.u_control = np.zeros(6)
@@ -99,7 +102,7 @@ class Controller:
     def step(self, eta: ArrayLike, eta_dot: ArrayLike, dt: float) -> Array:
         """Return the body wrench τ_b = J'(û_1 + u_trim) to hold for the next dt, shape (6,) [N, N m].
 
-        Learns once `period` has passed since it last did.
+        Learns at the first call, and then whenever `period` has passed since it last did.
 
         Parameters
         ----------
@@ -126,10 +129,11 @@ class Controller:
             raise InputError("eta and eta_dot must be finite, but contain NaN or infinity")
         self.zeta = require_state(self._error(pose, rate))
         self.last_step = None
-        self._since += dt
-        if self.learn and self._since >= self.period * (1.0 - 1e-9):
-            self.last_step = self.learner.step(self.zeta, self._since)
-            self._since = 0.0
+        since = self.period if self._since is None else self._since + dt
+        if self.learn and since >= self.period * (1.0 - 1e-9):
+            self.last_step = self.learner.step(self.zeta, since)
+            since = 0.0
+        self._since = since
         self.u_control, self.u_disturbance = self.learner.policies(self.zeta)
         return self.body_wrench(self.u_control + self.setup.model.u_trim)
 
@@ -149,3 +153,21 @@ class Controller:
         yaw = np.arctan2(np.sin(eta[5] - heading), np.cos(eta[5] - heading))
         position = turn @ (eta[:3] - self.station[:3])
         return np.concatenate([position, eta[3:5], [yaw], turn @ eta_dot[:3], eta_dot[3:]])
+
+
+def sample_strategy(settings: SampleSettings, setup: StationKeeping) -> SampleStrategy:
+    """Return the strategy that the settings name."""
+    if settings.strategy == "trajectory":
+        return TrajectorySamples(
+            setup.half_widths,
+            settings.number,
+            settings.seed,
+            spread=settings.spread,
+            ahead=settings.ahead,
+        )
+    shrinking = settings.strategy == "shrinking"
+    box = setup.half_widths if shrinking else setup.envelope
+    points = draw_samples(box, settings.number, settings.seed, inner=settings.inner)
+    if shrinking:
+        return ShrinkingSamples(points, setup.half_widths, settings.spread)
+    return FixedSamples(points)

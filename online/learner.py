@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..symbolic import Basis, Game, Problem, ValueFunctions
+from ..symbolic import Basis, Game, Path, Problem, ValueFunctions, growing_steps
 from ..symbolic.vehicle import Array
 from .actor import Projection, actor_step
 from .bellman import BellmanTerms, Residual, bellman_error
 from .critic import LeastSquares, NormalEquations, gradient_step, row_weights
-from .samples import rank_margin
-from .settings import LearnerSettings
+from .rows import BellmanSource, CostateSource, RowSource, SampleRows, Weights
+from .safeguard import Safeguard
+from .samples import FixedSamples, SampleStrategy, rank_margin
+from .settings import LearnerSettings, SampleSettings
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,12 @@ class LearnerStep:
     ----------
     critic, actor_1, actor_2 : (m,) weights, before a step moves them
     bellman_error : δ at the state (17), in units of cost per second
-    sample_error : rms over the samples of δ_j / (ζ_j'Qζ_j); NaN without samples
+    sample_error : rms over the samples of δ_j / (ζ_j'Qζ_j), or the root of the relative regret along
+        the predicted paths; NaN without samples
     projecting : whether the smooth projection acts on an actor
+    predicted_cost : J of the policy in use before the actors moved; NaN without safeguard
+    accepted : part of the actors' step that was certified; 1 without safeguard
+    fallback : whether the policy in use after the step is the linear one, since no other was certified
     """
 
     critic: Array
@@ -33,20 +39,25 @@ class LearnerStep:
     bellman_error: float
     sample_error: float
     projecting: bool
+    predicted_cost: float = np.nan
+    accepted: float = 1.0
+    fallback: bool = False
 
 
 class Learner:
-    """Learn the value of a game from the Bellman error at the state and at sample points.
+    """Learn the value of a game from the errors at the state and at sample points.
 
     Parameters
     ----------
     problem : the game on its plant
     basis : σ of the value function
     settings : rule and gains
-    samples : (N, n) points ζ_j; N may be 0
-    reference : (m,) weights that the leash pulls to and the projection bound is a multiple of
+    samples : (N, n) fixed points ζ_j, N may be 0; or a strategy that moves them
+    reference : (m,) weights that the leash pulls to, the projection bound is a multiple of, and the
+        safeguard falls back to
     initial : (m,) weights of critic and actors at the start; `reference` times weight_factor if None
     functions : compiled functions of problem and basis, if they exist already
+    paths : settings of the predicted paths of `costate` rows
 
     Attributes
     ----------
@@ -58,10 +69,11 @@ class Learner:
         problem: Problem,
         basis: Basis,
         settings: LearnerSettings,
-        samples: Array,
+        samples: Array | SampleStrategy,
         reference: Array,
         initial: Array | None = None,
         functions: ValueFunctions | None = None,
+        paths: SampleSettings | None = None,
     ) -> None:
         self.problem = problem
         self.basis = basis
@@ -77,9 +89,11 @@ class Learner:
             settings.covariance,
             settings.covariance_bound,
         )
-        self._samples = self._terms(samples) if len(samples) else None
         self._floor = 1e-5 * float(problem.scale @ problem.game.Q @ problem.scale)
-        self._leash = self._leash_strength()
+        self._steps = growing_steps(settings.horizon, settings.steps)
+        self._source = self._row_source(samples, paths or SampleSettings())
+        self._fixed_leash = self._leash(reference) if settings.error == "bellman" else None
+        self._guard = Safeguard(self.predicted_cost, reference) if settings.safeguard else None
 
     @property
     def game(self) -> Game:
@@ -88,18 +102,30 @@ class Learner:
 
     def step(self, zeta: Array, dt: float) -> LearnerStep:
         """Learn for dt from the state ζ (n,) and the samples; move critic, then actors."""
+        actors, cost, restarted = (self.actor_1, self.actor_2), np.nan, False
+        if self._guard is not None:
+            actors, cost, restarted = self._guard.certified(zeta, actors)
+        self.actor_1, self.actor_2 = actors
+        self._source.move(zeta, self._weights)
         seen, rows = self._observe(zeta)
         if self.settings.rule == "gradient":
             self.critic = gradient_step(self.critic, rows, dt)
         else:
             self.critic = self._least_squares.step(self.critic, rows, dt)
         gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
-        self.actor_1 = actor_step(self.actor_1, self.critic, gains[0], dt, self.projection)
-        self.actor_2 = actor_step(self.actor_2, self.critic, gains[1], dt, self.projection)
-        return seen
+        proposed = (
+            actor_step(actors[0], self.critic, gains[0], dt, self.projection),
+            actor_step(actors[1], self.critic, gains[1], dt, self.projection),
+        )
+        accepted = 1.0
+        if self._guard is not None:
+            proposed, accepted = self._guard.accepted(zeta, actors, proposed, cost)
+        self.actor_1, self.actor_2 = proposed
+        fallback = restarted and accepted == 0.0
+        return replace(seen, predicted_cost=cost, accepted=accepted, fallback=fallback)
 
     def observe(self, zeta: Array) -> LearnerStep:
-        """Return what a step at ζ (n,) would see, without moving the weights."""
+        """Return what a step at ζ (n,) would see at the present samples, without moving anything."""
         return self._observe(zeta)[0]
 
     def policies(self, zeta: Array) -> tuple[Array, Array]:
@@ -111,64 +137,93 @@ class Learner:
         """Return V_hat(ζ) = Ŵ_c'σ(ζ) (13)."""
         return float(self.critic @ self.functions.sigma(zeta)[0])
 
+    def predicted_cost(self, zeta: Array, actor_1: Array, actor_2: Array) -> float:
+        """Return J from ζ (n,) under these actor weights, infinite if they lose the vehicle."""
+        return self._predict(zeta, actor_1, actor_2).cost
+
     def sample_residual(self) -> Residual | None:
         """Return δ_j and ω_j at the samples under the present weights, or None without samples."""
-        return None if self._samples is None else self._residual(self._samples)
+        rows = self._source.rows(self._weights)
+        return None if rows is None else rows.residual
 
     def rank_margin(self) -> float:
         """Return λ_min of (18) under the present actors; 0 without samples."""
         residual = self.sample_residual()
         return 0.0 if residual is None else rank_margin(residual.omega)
 
+    @property
+    def _weights(self) -> Weights:
+        return self.critic, self.actor_1, self.actor_2
+
     def _observe(self, zeta: Array) -> tuple[LearnerStep, NormalEquations]:
         terms = self._terms(zeta[None, :])
-        here = self._residual(terms)
+        here = self._residual(terms, self._weights)
+        there = self._source.rows(self._weights)
         omega, delta = here.omega, here.delta
         weights = self.settings.gain_critic * self._row_weights(omega, terms.state_cost)
-        sample_error = np.nan
-        if self._samples is not None:
-            there = self._residual(self._samples)
-            omega, delta = np.vstack([omega, there.omega]), np.append(delta, there.delta)
-            weights = np.append(weights, self._sample_weights(there.omega))
-            sample_error = float(np.sqrt(np.mean((there.delta / self._samples.state_cost) ** 2)))
-        actors = (self.actor_1, self.actor_2)
+        if self.settings.error == "costate":
+            omega, delta, weights = omega[:0], delta[:0], weights[:0]
+        if there is not None:
+            omega, delta = (
+                np.vstack([omega, there.residual.omega]),
+                np.append(delta, there.residual.delta),
+            )
+            weights = np.append(weights, self._gained(there))
         seen = LearnerStep(
             critic=self.critic,
             actor_1=self.actor_1,
             actor_2=self.actor_2,
             bellman_error=float(here.delta[0]),
-            sample_error=sample_error,
-            projecting=any(self.projection.active(actor) for actor in actors),
+            sample_error=np.nan if there is None else there.error,
+            projecting=any(self.projection.active(actor) for actor in self._weights[1:]),
         )
+        leash = self._fixed_leash if self._fixed_leash is not None else self._leash_of(there)
         offset = self.critic - self.reference
-        return seen, NormalEquations.of(omega, delta, weights, self._leash, offset)
+        return seen, NormalEquations.of(omega, delta, weights, leash, offset)
 
     def _terms(self, points: Array) -> BellmanTerms:
         return BellmanTerms.at(points, self.functions.at(points), self.game)
 
-    def _residual(self, terms: BellmanTerms) -> Residual:
-        return bellman_error(terms, self.game, self.critic, self.actor_1, self.actor_2)
+    def _residual(self, terms: BellmanTerms, weights: Weights) -> Residual:
+        return bellman_error(terms, self.game, *weights)
 
     def _row_weights(self, omega: Array, state_cost: Array) -> Array:
         return row_weights(self.settings.normalizer, omega, state_cost, self._floor)
 
-    def _sample_weights(self, omega: Array) -> Array:
+    def _gained(self, rows: SampleRows) -> Array:
         """Return η_c w_j of the sample rows, shape (N,)."""
-        assert self._samples is not None
         settings = self.settings
         gain = settings.gain_critic if settings.gain_samples is None else settings.gain_samples
-        share = gain / len(self._samples) if settings.average_samples else gain
-        return share * self._row_weights(omega, self._samples.state_cost)
+        return np.asarray((gain / len(rows) if settings.average_samples else gain) * rows.weights)
 
-    def _leash_strength(self) -> Array:
-        """Return ρ for each weight: the leash times Σ w ω^2 of the samples at the reference."""
-        if self._samples is None or self.settings.leash == 0.0:
+    def _leash(self, reference: Array) -> Array:
+        """Return the leash at the reference weights."""
+        return self._leash_of(self._source.rows((reference, reference, reference)))
+
+    def _leash_of(self, rows: SampleRows | None) -> Array:
+        """Return ρ for each weight: the leash times Σ w ω^2 of the samples."""
+        if rows is None or self.settings.leash == 0.0:
             return np.zeros(self.basis.n_basis)
-        reference = self.reference
-        start = bellman_error(self._samples, self.game, reference, reference, reference)
-        information = self._sample_weights(start.omega) @ start.omega**2
-        return np.asarray(self.settings.leash * information)
+        return np.asarray(self.settings.leash * (self._gained(rows) @ rows.residual.omega**2))
 
     def _ball(self) -> Projection:
         bound = self.settings.weight_bound * float(np.linalg.norm(self.reference))
         return Projection(bound=bound, margin=0.1 * bound)
+
+    def _predict(self, zeta: Array, actor_1: Array, actor_2: Array) -> Path:
+        prediction = self.functions.prediction(self.settings.steps)
+        return prediction.path(zeta, actor_1, actor_2, self._steps)
+
+    def _row_source(self, samples: Array | SampleStrategy, paths: SampleSettings) -> RowSource:
+        if self.settings.error == "costate":
+            return CostateSource(
+                self.functions.prediction(self.settings.steps),
+                self._steps,
+                self.problem.scale,
+                paths=paths.paths,
+                points=paths.path_points,
+                spread=paths.spread,
+                seed=paths.seed,
+            )
+        strategy = FixedSamples(samples) if isinstance(samples, np.ndarray) else samples
+        return BellmanSource(strategy, self._terms, self._residual, self._row_weights, self._predict)

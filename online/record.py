@@ -6,7 +6,7 @@ import contextlib
 import os
 import re
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -24,6 +24,7 @@ FORCE_NAMES = ("X", "Y", "Z", "K", "M", "N")
 OVER_TIME = ("time", "zeta", "tau_b", "u_control", "disturbance", "cost", "attenuated")
 OVER_LEARNING = (
     *("learn_time", "bellman_error", "sample_error", "rank_margin", "projecting"),
+    *("predicted_cost", "accepted", "fallback"),
     *("critic", "actor_1", "actor_2"),
 )
 _STATE_UNITS = "m, rad, m/s, rad/s"
@@ -37,8 +38,6 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     and the end of the run), `state`, `force`, `basis`.
     """
     m = len(history.critic[0]) if history.critic else 0
-    over_time, over_learning = ("time",), ("learn_time",)
-    weights = ("learn_time", "basis")
 
     # an interrupt may have come between two appends
     n_time = min(len(getattr(history, name)) for name in OVER_TIME)
@@ -52,7 +51,30 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
         n = n_time if name in OVER_TIME else n_learn
         return np.array(getattr(history, name)[:n], dtype=float)
 
-    variables = {
+    variables = _variables(stack, series, m)
+    coordinates = {
+        "time": ("time", series("time"), {"units": "s"}),
+        "learn_time": ("learn_time", series("learn_time"), {"units": "s"}),
+        "state": list(STATE_NAMES),
+        "force": list(FORCE_NAMES),
+    }
+    data = {name: (dims, values, {"units": unit}) for name, (dims, values, unit) in variables.items()}
+    attributes = {
+        **provenance,
+        **versions(),
+        "stopped": history.stopped or "",
+        "n_fallback": int(np.sum(history.fallback)),
+    }
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def _variables(
+    stack: Callable[[str, int], Array], series: Callable[[str], Array], m: int
+) -> dict[str, tuple[tuple[str, ...], Array, str]]:
+    """Return dimensions, values and unit of every variable."""
+    over_time, over_learning = ("time",), ("learn_time",)
+    weights = ("learn_time", "basis")
+    return {
         "zeta": ((*over_time, "state"), stack("zeta", 12), _STATE_UNITS),
         "tau_b": ((*over_time, "force"), stack("tau_b", 6), _FORCE_UNITS),
         "u_control": ((*over_time, "force"), stack("u_control", 6), _FORCE_UNITS),
@@ -63,19 +85,13 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
         "sample_error": (over_learning, series("sample_error"), "1"),
         "rank_margin": (over_learning, series("rank_margin"), "1"),
         "projecting": (over_learning, series("projecting").astype(np.int8), "1"),
+        "predicted_cost": (over_learning, series("predicted_cost"), "cost"),
+        "accepted": (over_learning, series("accepted"), "1"),
+        "fallback": (over_learning, series("fallback").astype(np.int8), "1"),
         "critic": (weights, stack("critic", m), "cost"),
         "actor_1": (weights, stack("actor_1", m), "cost"),
         "actor_2": (weights, stack("actor_2", m), "cost"),
     }
-    coordinates = {
-        "time": ("time", series("time"), {"units": "s"}),
-        "learn_time": ("learn_time", series("learn_time"), {"units": "s"}),
-        "state": list(STATE_NAMES),
-        "force": list(FORCE_NAMES),
-    }
-    data = {name: (dims, values, {"units": unit}) for name, (dims, values, unit) in variables.items()}
-    attributes = {**provenance, **versions(), "stopped": history.stopped or ""}
-    return xr.Dataset(data, coordinates, attributes)
 
 
 def versions() -> dict[str, str]:

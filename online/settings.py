@@ -15,6 +15,7 @@ from pydantic import (
 
 from ..symbolic.settings import Settings
 from .critic import Normalizer
+from .samples import Strategy
 
 Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
@@ -27,6 +28,12 @@ class LearnerSettings(Settings):
     Attributes
     ----------
     rule : `gradient` is (19); `least_squares` is recursive, with forgetting
+    error : what the critic learns from: `bellman`, the Bellman error (17) at the samples, or `costate`,
+        the error of its gradient's policy along predicted trajectories, see `rows.CostateSource`
+    safeguard : move the actors only as far as the model predicts no higher cost, and restart them from
+        the Riccati weights where these are predicted to cost less
+    horizon : of the predictions [s]; after it the cost is ζ'P ζ
+    steps : of the integration over the horizon
     normalizer : weight of a row; `paper` is 1/p as printed, see `critic.row_weights`
     gain_critic : η_c of the row at the state [1/s]
     gain_samples : η_c of the sample rows [1/s]; as gain_critic when not given
@@ -43,6 +50,10 @@ class LearnerSettings(Settings):
     """
 
     rule: Literal["gradient", "least_squares"] = "least_squares"
+    error: Literal["bellman", "costate"] = "bellman"
+    safeguard: bool = False
+    horizon: PositiveFloat = 30.0
+    steps: Annotated[int, Field(ge=10, le=2000)] = 200
     normalizer: Normalizer = "paper"
     gain_critic: NonNegativeFloat = 1.0
     gain_samples: NonNegativeFloat | None = None
@@ -74,14 +85,29 @@ class LearnerSettings(Settings):
 
 
 class SampleSettings(Settings):
-    """Sample points ζ_j of (18): `number` of them, drawn in the envelope with `seed`.
+    """Sample points ζ_j of (18), and the trajectories that are predicted for `costate` rows.
 
-    `inner`: points are shrunk by a factor uniform on (inner, 1), so that some lie near the origin.
+    Attributes
+    ----------
+    strategy : `fixed` in the envelope, `shrinking` with the state, or along the predicted `trajectory`
+    number : N of the points
+    seed : of everything that is drawn
+    inner : fixed and shrinking points are shrunk by a factor uniform on (inner, 1), so that some lie
+        near the origin
+    spread : of moving points around the state or the trajectory, as a part of its largest scaled entry
+    ahead : part of the predicted trajectory that the points follow [s]
+    paths : trajectories predicted for `costate` rows, the first from the state itself
+    path_points : points of each that give rows
     """
 
+    strategy: Strategy = "fixed"
     number: NonNegativeInt = 600
     seed: NonNegativeInt = 1
     inner: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
+    spread: PositiveFloat = 0.5
+    ahead: PositiveFloat = 12.0
+    paths: PositiveInt = 4
+    path_points: Annotated[int, Field(ge=2)] = 20
 
 
 class DisturbanceSettings(Settings):

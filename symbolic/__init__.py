@@ -5,6 +5,7 @@ from .errors import GammaTooSmallError, InputError, RunError, StationkeepError
 from .game import Game
 from .kernel import Export, Kernel
 from .model import Model, require_state
+from .prediction import Path, Prediction, growing_steps
 from .problem import InverseDynamics, Problem, closed_form_problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star
 from .station import StationKeeping
@@ -20,7 +21,9 @@ __all__ = [
     "InverseDynamics",
     "Kernel",
     "Model",
+    "Path",
     "PointTerms",
+    "Prediction",
     "Problem",
     "RunError",
     "StationKeeping",
@@ -35,6 +38,7 @@ __all__ = [
     "game_riccati",
     "gamma_hamiltonian",
     "gamma_star",
+    "growing_steps",
     "quadratic",
     "require_state",
 ]

@@ -11,6 +11,7 @@ from casadi import DM, MX, SX
 
 from .basis import Basis
 from .kernel import Export, Kernel, dense_function, export
+from .prediction import Prediction
 from .problem import Problem
 from .vehicle import Array
 
@@ -39,6 +40,7 @@ class ValueFunctions:
         self._compiled = compiled
         self._exports: dict[str, Export] = {}
         self._samplers: dict[int, Kernel] = {}
+        self._predictions: dict[int, Prediction] = {}
 
     @cached_property
     def sigma(self) -> Kernel:
@@ -77,9 +79,7 @@ class ValueFunctions:
             names = ["f", "g", "sigma_prime"]
             function = casadi.Function("sample_kernel", [points], [*mapped], ["points"], names)
             operations = point.n_instructions() * n_samples
-            kernel, described = export(function, compiled=self._compiled, operations=operations)
-            self._exports["sample_kernel"] = described
-            self._samplers[n_samples] = kernel
+            self._samplers[n_samples] = self._export_mapped(function, operations)
         return self._samplers[n_samples]
 
     def at(self, points: Array) -> PointTerms:
@@ -94,6 +94,14 @@ class ValueFunctions:
         kernel.evaluate()
         f, g, sigma_prime = (_by_point(output, n_points) for output in kernel.outputs)
         return PointTerms(f[..., 0], g, sigma_prime)
+
+    def prediction(self, n_steps: int) -> Prediction:
+        """Return the predicted closed loop of N steps and its costates."""
+        if n_steps not in self._predictions:
+            self._predictions[n_steps] = Prediction(
+                self.problem, self.basis, n_steps, self._export_mapped
+            )
+        return self._predictions[n_steps]
 
     def exports(self, n_samples: int) -> Iterator[Export]:
         """Build every function and yield what became of it."""
@@ -115,6 +123,11 @@ class ValueFunctions:
             "sigma_prime": self.basis.jacobian,
         }
         return dense_function("point", {"zeta": zeta}, outputs)
+
+    def _export_mapped(self, function: casadi.Function, operations: int) -> Kernel:
+        kernel, described = export(function, compiled=self._compiled, operations=operations)
+        self._exports[function.name()] = described
+        return kernel
 
     def _export(self, name: str, inputs: dict[str, SX], outputs: dict[str, SX]) -> Kernel:
         kernel, described = export(dense_function(name, inputs, outputs), compiled=self._compiled)

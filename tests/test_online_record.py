@@ -34,7 +34,7 @@ def dataset() -> xr.Dataset:
 def test_dimensions_and_units(dataset: xr.Dataset) -> None:
     assert dict(dataset.sizes) == {
         "time": 31,
-        "learn_time": 3,  # at 0.26 s, at 0.52 s and the end
+        "learn_time": 4,  # at once, at 0.26 s, at 0.52 s and the end
         "state": 12,
         "force": 6,
         "basis": 78,
@@ -272,7 +272,8 @@ def test_a_run_goes_on_from_a_record(dataset: xr.Dataset, tmp_path: Path) -> Non
 def test_weights_of_another_basis_are_refused(tmp_path: Path, one_sentence: Check) -> None:
     other = History(learn_time=[0.0], critic=[np.ones(5)], actor_1=[np.ones(5)], actor_2=[np.ones(5)])
     other.bellman_error, other.sample_error, other.rank_margin = [0.0], [0.0], [0.0]
-    other.projecting = [False]
+    other.projecting, other.fallback = [False], [False]
+    other.predicted_cost, other.accepted = [1.0], [1.0]
     path = save(to_dataset(other, {}), tmp_path / "other.nc")
     scenario = Scenario.load("bluerov2-heavy", [*QUICK, f'learner.weights="{path}"'])
     with pytest.raises(InputError, match=r"holds 5 weights, but basis 'quadratic' has 78") as caught:
