@@ -28,11 +28,16 @@ CASES: dict[str, dict[str, dict[str, Any]]] = {
     "gradient law": {
         "learner": {
             "rule": "gradient",
+            "error": "bellman",
+            "safeguard": False,
             "normalizer": "paper",
             "leash": 0.0,
             "gain_samples": None,
             "average_samples": False,
-        }
+            "gain_actor_1": 2.0,
+            "gain_actor_2": 2.0,
+        },
+        "samples": {"strategy": "fixed"},
     },
 }
 LABELS = {"learned": "learned (this scenario)", "linear": "linear H-infinity"}

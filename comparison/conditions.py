@@ -51,7 +51,7 @@ def check(scenario: Scenario, bounds: Bounds | None = None) -> list[Condition]:
     learner = Learner(
         station.problem,
         station.basis,
-        scenario.learner,
+        scenario.learner.model_copy(update={"error": "bellman", "safeguard": False}),
         points,
         station.riccati_weights,
         scenario.initial_weights(),

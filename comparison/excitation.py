@@ -19,6 +19,19 @@ from ..symbolic.integration import integrate
 from ..symbolic.vehicle import Array
 from .scenario import Scenario
 
+# the Bellman error alone, without what holds the weights
+PLAIN = {
+    "rule": "least_squares",
+    "error": "bellman",
+    "safeguard": False,
+    "normalizer": "state_cost",
+    "gain_actor_1": 2.0,
+    "gain_actor_2": 2.0,
+    "forgetting": 2.0,
+    "leash": 0.0,
+    "weight_factor": 0.5,
+}
+
 
 @dataclass(frozen=True)
 class ExcitationRun:
@@ -59,14 +72,7 @@ def excitation_runs(
     in the part `shrink` of the scenario's envelope, where drag leaves the monomials a meaning.
     """
     station = scenario.station_keeping()
-    eager = scenario.learner.model_copy(
-        update={
-            "rule": "least_squares",
-            "normalizer": "state_cost",
-            "leash": 0.0,
-            "weight_factor": 0.5,
-        }
-    )
+    eager = scenario.learner.model_copy(update=PLAIN)
     cautious = eager.model_copy(update={"covariance": 1e2, "covariance_bound": 1e3})
     envelope, start = shrink * station.envelope, shrink * scenario.initial_state
     seed = scenario.samples.seed

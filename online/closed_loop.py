@@ -65,6 +65,7 @@ class History:
     critic: list[Array] = field(default_factory=list)
     actor_1: list[Array] = field(default_factory=list)
     actor_2: list[Array] = field(default_factory=list)
+    remembered: Array | None = None
     stopped: str | None = None
     wall_seconds: float = 0.0
 
@@ -177,6 +178,7 @@ class _Loop:
         if isinstance(self.policy, Controller) and self.policy.learn:
             learner = self.policy.learner
             self._record_learner(learner.observe(self.policy.zeta), learner, last=True)
+            self.history.remembered = None if learner.memory is None else learner.memory.weights
 
 
 STATE_NAMES = (

@@ -50,7 +50,7 @@ class Controller:
     scenario : vehicle, game, basis, learner and samples
     station : x, y, z [m] and heading ψ [rad] to hold, in the earth frame
     learn : False keeps the initial weights (with the default ones, the linear H-infinity policy
-        -R^-1 g(ζ)'P ζ)
+        -R^-1 g(ζ)'P ζ); with a safeguard, only from where they are predicted to cost less than linear
 
     Attributes
     ----------
@@ -82,16 +82,20 @@ class Controller:
                 "earth frame so that its x axis is the heading to hold, and the current with it"
             )
         self.learn = learn
+        weights = scenario.initial_weights()
         self.learner = Learner(
             self.setup.problem,
             self.setup.basis,
             scenario.learner,
             sample_strategy(scenario.samples, self.setup) if learn else np.zeros((0, 12)),
             self.setup.riccati_weights,
-            scenario.initial_weights(),
+            weights,
             self.setup.functions,
             scenario.samples,
+            self.setup.envelope if learn and scenario.samples.remember else None,
         )
+        # nothing to certify where the frozen weights are the linear policy's own
+        self.certify = not learn and scenario.learner.safeguard and weights is not None
         self.period = scenario.learner.period
         self._since: float | None = None
         self.last_step: LearnerStep | None = None
@@ -132,6 +136,9 @@ class Controller:
         since = self.period if self._since is None else self._since + dt
         if self.learn and since >= self.period * (1.0 - 1e-9):
             self.last_step = self.learner.step(self.zeta, since)
+            since = 0.0
+        elif self.certify and since >= self.period * (1.0 - 1e-9):
+            self.last_step = self.learner.certify(self.zeta)
             since = 0.0
         self._since = since
         self.u_control, self.u_disturbance = self.learner.policies(self.zeta)

@@ -11,7 +11,8 @@ from ..symbolic.vehicle import Array
 from .actor import Projection, actor_step
 from .bellman import BellmanTerms, Residual, bellman_error
 from .critic import LeastSquares, NormalEquations, gradient_step, row_weights
-from .rows import BellmanSource, CostateSource, RowSource, SampleRows, Weights
+from .memory import Memory
+from .rows import BellmanSource, CostateSource, PathRows, RowSource, SampleRows, Weights
 from .safeguard import Safeguard
 from .samples import FixedSamples, SampleStrategy, rank_margin
 from .settings import LearnerSettings, SampleSettings
@@ -58,10 +59,12 @@ class Learner:
     initial : (m,) weights of critic and actors at the start; `reference` times weight_factor if None
     functions : compiled functions of problem and basis, if they exist already
     paths : settings of the predicted paths of `costate` rows
+    envelope : (n,) half-widths of what is remembered; None remembers nothing
 
     Attributes
     ----------
     critic, actor_1, actor_2 : (m,) Ŵ_c, Ŵ_a1, Ŵ_a2
+    memory : weights for the whole envelope, or None
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class Learner:
         initial: Array | None = None,
         functions: ValueFunctions | None = None,
         paths: SampleSettings | None = None,
+        envelope: Array | None = None,
     ) -> None:
         self.problem = problem
         self.basis = basis
@@ -82,6 +86,7 @@ class Learner:
         self.reference = reference
         start = reference * settings.weight_factor if initial is None else initial
         self.critic, self.actor_1, self.actor_2 = start.copy(), start.copy(), start.copy()
+        self._initial = (self.actor_1, self.actor_2)
         self.projection = self._ball()
         self._least_squares = LeastSquares(
             basis.n_basis,
@@ -93,6 +98,7 @@ class Learner:
         self._steps = growing_steps(settings.horizon, settings.steps)
         self._source = self._row_source(samples, paths or SampleSettings())
         self._fixed_leash = self._leash(reference) if settings.error == "bellman" else None
+        self.memory = self._new_memory(envelope, paths or SampleSettings())
         self._guard = Safeguard(self.predicted_cost, reference) if settings.safeguard else None
 
     @property
@@ -121,8 +127,19 @@ class Learner:
         if self._guard is not None:
             proposed, accepted = self._guard.accepted(zeta, actors, proposed, cost)
         self.actor_1, self.actor_2 = proposed
+        if self.memory is not None:
+            self.memory.step()
         fallback = restarted and accepted == 0.0
         return replace(seen, predicted_cost=cost, accepted=accepted, fallback=fallback)
+
+    def certify(self, zeta: Array) -> LearnerStep:
+        """Use the initial weights where they are predicted to cost less than the reference, else that.
+
+        For a learner that is not to learn; it needs the safeguard.
+        """
+        assert self._guard is not None
+        (self.actor_1, self.actor_2), cost, fell_back = self._guard.certified(zeta, self._initial)
+        return replace(self.observe(zeta), predicted_cost=cost, accepted=0.0, fallback=fell_back)
 
     def observe(self, zeta: Array) -> LearnerStep:
         """Return what a step at ζ (n,) would see at the present samples, without moving anything."""
@@ -216,14 +233,22 @@ class Learner:
 
     def _row_source(self, samples: Array | SampleStrategy, paths: SampleSettings) -> RowSource:
         if self.settings.error == "costate":
+            path_rows = self._path_rows(paths.path_points)
             return CostateSource(
-                self.functions.prediction(self.settings.steps),
-                self._steps,
+                path_rows,
                 self.problem.scale,
                 paths=paths.paths,
-                points=paths.path_points,
                 spread=paths.spread,
                 seed=paths.seed,
             )
         strategy = FixedSamples(samples) if isinstance(samples, np.ndarray) else samples
         return BellmanSource(strategy, self._terms, self._residual, self._row_weights, self._predict)
+
+    def _path_rows(self, points: int) -> PathRows:
+        return PathRows(self.functions.prediction(self.settings.steps), self._steps, points)
+
+    def _new_memory(self, envelope: Array | None, paths: SampleSettings) -> Memory | None:
+        if envelope is None:
+            return None
+        path_rows = self._path_rows(paths.path_points)
+        return Memory(path_rows, self.predicted_cost, envelope, self.reference, seed=paths.seed)

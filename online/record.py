@@ -58,13 +58,17 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
         "state": list(STATE_NAMES),
         "force": list(FORCE_NAMES),
     }
-    data = {name: (dims, values, {"units": unit}) for name, (dims, values, unit) in variables.items()}
+    data: dict[str, tuple[tuple[str, ...], Array, dict[str, str]]] = {
+        name: (dims, values, {"units": unit}) for name, (dims, values, unit) in variables.items()
+    }
     attributes = {
         **provenance,
         **versions(),
         "stopped": history.stopped or "",
         "n_fallback": int(np.sum(history.fallback)),
     }
+    if history.remembered is not None:
+        data["remembered"] = (("basis",), history.remembered, {"units": "cost"})
     return xr.Dataset(data, coordinates, attributes)
 
 
@@ -154,7 +158,7 @@ def read_parts(path: Path, *names: str) -> tuple[dict[str, Any], dict[str, Array
 
 
 def load_weights(path: Path) -> Array:
-    """Return the ideal weights of a record, or the last critic weights of a run, shape (m,).
+    """Return ideal weights, those that a run remembers, or its last critic weights, shape (m,).
 
     Raises
     ------
@@ -164,6 +168,8 @@ def load_weights(path: Path) -> Array:
     dataset = load(path)
     if "ideal_weights" in dataset:
         weights = dataset["ideal_weights"].values
+    elif "remembered" in dataset:
+        weights = dataset["remembered"].values
     elif "critic" in dataset and dataset.sizes.get("learn_time", 0) > 0:
         weights = dataset["critic"].values[-1]
     else:

@@ -98,8 +98,8 @@ class BellmanSource:
         )
 
 
-class CostateSource:
-    """Rows of the costate error along predicted trajectories of the present policy.
+class PathRows:
+    """Rows of the costate error along predicted trajectories of a policy.
 
     With v = u_1 + u_2 the policy v̂ of any weights W costs, from any state,
 
@@ -119,65 +119,70 @@ class CostateSource:
     Parameters
     ----------
     prediction, steps : of the paths
+    points : of each path that give rows
+    """
+
+    def __init__(self, prediction: Prediction, steps: Array, points: int) -> None:
+        self._prediction = prediction
+        self._steps = steps
+        edges = np.unique(np.linspace(0, len(steps), points + 1).astype(int))
+        self._nodes = edges[:-1]
+        self._spans = np.diff(np.append(0.0, np.cumsum(steps))[edges])
+
+    def at(self, starts: Array, actor_1: Array, actor_2: Array) -> tuple[Array, Array, Array] | None:
+        """Return ω (N, m), targets (N,) and weights (N,) of the paths from the rows of `starts`.
+
+        Paths that leave, or that cost nothing since the start is the origin, give no rows; None when
+        there is no other.
+        """
+        found = [self._prediction.costates(z, actor_1, actor_2, self._steps) for z in starts]
+        usable = [path for path in found if 0.0 < path.cost < np.inf]
+        return self._stacked(usable) if usable else None
+
+    def _stacked(self, paths: list[Path]) -> tuple[Array, Array, Array]:
+        points = np.vstack([path.states[self._nodes] for path in paths])
+        costates = np.vstack([path.costates[self._nodes] for path in paths])  # type: ignore[index]
+        regressors, targets, sigma = self._prediction.rows(points, costates)
+        k, m = regressors.shape[1:]
+        to_go = np.concatenate([path.cost_to_go[self._nodes] for path in paths])
+        # what is left to pay is the difference of two large numbers: no rows where rounding owns it
+        least = 1e-9 * np.repeat([path.cost for path in paths], len(self._nodes))
+        spans = np.where(to_go > least, np.tile(self._spans, len(paths)), 0.0) / len(paths)
+        floored = np.maximum(to_go, least)
+        value_weights = VALUE_SHARE * spans / (self._spans.sum() * floored**2)
+        return (
+            np.vstack([regressors.reshape(-1, m), sigma]),
+            np.concatenate([targets.reshape(-1), to_go]),
+            np.append(np.repeat(spans / floored, k), value_weights),
+        )
+
+
+class CostateSource:
+    """Rows of the costate error along paths from the state and from around it.
+
+    Parameters
+    ----------
+    path_rows : of the predicted paths
     half_widths : (n,) with x = ζ / half_widths
     paths : how many; the first starts at the state, the others around it
-    points : of each path that give rows
     spread : of the other starts, as a part of max_i |x_i|
     seed : of their directions, new ones at every step
     """
 
     def __init__(
-        self,
-        prediction: Prediction,
-        steps: Array,
-        half_widths: Array,
-        *,
-        paths: int,
-        points: int,
-        spread: float,
-        seed: int,
+        self, path_rows: PathRows, half_widths: Array, *, paths: int, spread: float, seed: int
     ) -> None:
-        self._prediction = prediction
-        self._steps = steps
+        self._path_rows = path_rows
         self._half_widths = half_widths
         self._paths, self._spread = paths, spread
         self._rng = np.random.default_rng(seed)
-        edges = np.unique(np.linspace(0, len(steps), points + 1).astype(int))
-        self._nodes = edges[:-1]
-        self._spans = np.diff(np.append(0.0, np.cumsum(steps))[edges])
         self._data: tuple[Array, Array, Array] | None = None
 
     def move(self, zeta: Array, weights: Weights) -> None:
-        """Predict the paths and their costates under the present actors.
-
-        Paths that leave, or that cost nothing since the state is the origin, give no rows.
-        """
+        """Predict the paths and their costates under the present actors."""
         centers = np.tile(zeta, (self._paths - 1, 1))
         starts = np.vstack([zeta, around(centers, self._half_widths, self._spread, self._rng)])
-        found = [self._prediction.costates(start, *weights[1:], self._steps) for start in starts]
-        usable = [path for path in found if 0.0 < path.cost < np.inf]
-        if not usable:
-            self._data = None
-            return
-        self._data = self._stacked(usable)
-
-    def _stacked(self, usable: list[Path]) -> tuple[Array, Array, Array]:
-        """Return ω, the targets and the weights of all rows of the paths."""
-        points = np.vstack([path.states[self._nodes] for path in usable])
-        costates = np.vstack([path.costates[self._nodes] for path in usable])  # type: ignore[index]
-        regressors, targets, sigma = self._prediction.rows(points, costates)
-        k, m = regressors.shape[1:]
-        to_go = np.concatenate(
-            [np.maximum(path.cost_to_go[self._nodes], 1e-12 * path.cost) for path in usable]
-        )
-        spans = np.tile(self._spans, len(usable)) / len(usable)
-        return (
-            np.vstack([regressors.reshape(-1, m), sigma]),
-            np.concatenate([targets.reshape(-1), to_go]),
-            np.append(
-                np.repeat(spans / to_go, k), VALUE_SHARE * spans / (self._spans.sum() * to_go**2)
-            ),
-        )
+        self._data = self._path_rows.at(starts, *weights[1:])
 
     def rows(self, weights: Weights) -> SampleRows | None:
         """Return the rows under the present critic; the error is the root of the relative regret."""

@@ -98,6 +98,7 @@ class SampleSettings(Settings):
     ahead : part of the predicted trajectory that the points follow [s]
     paths : trajectories predicted for `costate` rows, the first from the state itself
     path_points : points of each that give rows
+    remember : also learn weights for the whole envelope, to be used when learning is switched off
     """
 
     strategy: Strategy = "fixed"
@@ -108,6 +109,7 @@ class SampleSettings(Settings):
     ahead: PositiveFloat = 12.0
     paths: PositiveInt = 4
     path_points: Annotated[int, Field(ge=2)] = 20
+    remember: bool = False
 
 
 class DisturbanceSettings(Settings):

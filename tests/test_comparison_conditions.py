@@ -185,11 +185,11 @@ def test_margin_of_18() -> None:
 
 
 def test_gain_conditions() -> None:
-    """(24) waits for ε'; the known part of (25) is (2 + 2) / (2 · 1), which no margin reaches here."""
+    """(24) waits for ε'; the known part of (25) is (16 + 16) / (2 · 1), which no margin reaches."""
     first, second = one("(24)"), one("(25)")
     assert first.value == pytest.approx(20.0)
     assert first.holds is None
-    assert second.bound == pytest.approx(2.0)
+    assert second.bound == pytest.approx(16.0)
     assert second.value == pytest.approx(one("c_lower > 0").value, rel=1e-6)
     assert second.holds is False
     slow = one("(25)", "learner.gain_actor_1=1", "learner.gain_actor_2=3", "learner.gain_critic=8")

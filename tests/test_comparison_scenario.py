@@ -101,7 +101,7 @@ def test_files_beside_the_scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     changes = (
         ('vehicle = "bluerov2-heavy"', 'vehicle = "heavy.toml"'),
         ('name = "drag" ', 'name = "basis.py:more" '),
-        ("leash = 0.005", "leash = 0.005\nweights = 'first.nc'"),
+        ("leash = 0.001 ", "weights = 'first.nc'\nleash = 0.001 "),
     )
     path = write_scenario(folder, *changes)
     vehicle = (VEHICLES / "bluerov2-heavy.toml").read_text(encoding="utf-8")

@@ -1,0 +1,97 @@
+"""What a run remembers of the envelope, and frozen weights under the safeguard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stationkeep.online import (
+    Controller,
+    Learner,
+    LearnerSettings,
+    draw_samples,
+    load_weights,
+    run,
+    save,
+    to_dataset,
+)
+
+from .games import TWO_STATE_WEIGHTS, quick_scenario, two_state
+
+REFERENCE = np.array([0.8, 0.2, 1.4])
+SETTINGS = LearnerSettings(error="costate", safeguard=True, steps=200)
+
+
+def remembering(entry: float, n_steps: int = 40) -> Learner:
+    problem, basis, functions = two_state()
+    taught = Learner(
+        problem,
+        basis,
+        SETTINGS,
+        np.zeros((0, 2)),
+        REFERENCE,
+        functions=functions,
+        envelope=problem.scale,
+    )
+    for _ in range(n_steps):
+        taught.step(np.array([entry, 0.0]), 0.25)
+    return taught
+
+
+def test_remembered_weights_are_optimal_in_the_whole_envelope() -> None:
+    """V* = ζ_1^2 / 2 + ζ_2^2 from states that the vehicle never came near."""
+    taught = remembering(1e-3, n_steps=200)
+    assert taught.memory is not None
+    weights = taught.memory.weights
+    # the leash keeps a thousandth of the way back to the reference
+    np.testing.assert_allclose(weights[1:], TWO_STATE_WEIGHTS[1:], atol=5e-3)
+    problem = two_state()[0]
+    ratios = []
+    for zeta in draw_samples(problem.scale, 20, 5):
+        value = zeta[0] ** 2 / 2 + zeta[1] ** 2
+        cost = taught.predicted_cost(zeta, weights, weights)
+        assert cost == pytest.approx(value, rel=1e-4)
+        ratios.append(cost / taught.predicted_cost(zeta, REFERENCE, REFERENCE))
+    assert np.mean(ratios) < 0.99
+    assert taught.memory.relative_cost == pytest.approx(np.mean(ratios), abs=0.03)
+
+
+def test_remembered_weights_do_not_move_the_policy() -> None:
+    problem, basis, functions = two_state()
+    plain = Learner(problem, basis, SETTINGS, np.zeros((0, 2)), REFERENCE, functions=functions)
+    for _ in range(40):
+        plain.step(np.array([0.5, 0.0]), 0.25)
+    np.testing.assert_array_equal(plain.actor_1, remembering(0.5).actor_1)
+
+
+COSTATE = ("learner.error=costate", "learner.safeguard=true", "learner.steps=100")
+
+
+def test_a_record_keeps_what_was_remembered(tmp_path: Path) -> None:
+    scenario = quick_scenario(*COSTATE, "samples.remember=true", "simulation.duration=4")
+    history = run(scenario)
+    assert history.remembered is not None
+    path = save(to_dataset(history, {}), tmp_path / "run.nc")
+    np.testing.assert_array_equal(load_weights(path), history.remembered)
+    assert not np.array_equal(history.remembered, history.critic[-1])
+    dataset = to_dataset(history, {})
+    assert dataset.attrs["n_fallback"] == dataset["fallback"].values.sum()
+    assert np.all(np.isfinite(dataset["predicted_cost"].values[:-1]))
+
+
+@pytest.mark.parametrize(("factor", "fallback"), [(1.0, False), (0.05, True), (-1.0, True)])
+def test_frozen_weights_worse_than_linear_are_not_used(
+    tmp_path: Path, factor: float, fallback: bool
+) -> None:
+    scenario = quick_scenario(*COSTATE, "simulation.duration=0.1")
+    history = run(scenario)
+    history.critic[-1] = factor * history.critic[-1]
+    path = save(to_dataset(history, {}), tmp_path / "run.nc")
+    frozen = quick_scenario(*COSTATE, f'learner.weights="{path}"')
+    controller = Controller(frozen, learn=False)
+    controller.step(frozen.initial_state[:6], frozen.initial_state[6:], 0.02)
+    assert controller.last_step is not None
+    assert controller.last_step.fallback is fallback
+    expected = controller.setup.riccati_weights if fallback else history.critic[-1]
+    np.testing.assert_array_equal(controller.learner.actor_1, expected)
