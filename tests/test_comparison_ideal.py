@@ -31,7 +31,10 @@ from .games import HALF_WIDTHS, Array, quick_scenario
 
 Capture = pytest.CaptureFixture[str]
 Check = Callable[[BaseException], str]
-TINY = ("offline.horizon=12", "offline.intervals=6", "offline.degree=4", "offline.aligned=false")
+TINY = (
+    *("offline.horizon=12", "offline.intervals=6", "offline.degree=4", "offline.aligned=false"),
+    *("offline.rounds=1", "offline.starts=0"),
+)
 SETTINGS = sets(*QUICK, *TINY, *LOOSE)
 
 
@@ -196,7 +199,8 @@ def found_in(conditions: list[Condition], words: str) -> Condition:
 
 def test_24_and_25_share_an_epsilon() -> None:
     """With a gain that makes (25) possible: each bound is the printed one at the other's ε."""
-    scenario = quick_scenario("learner.rule='gradient'", "learner.gain_critic=1e9")
+    actor_gains = ("learner.gain_actor_1=2", "learner.gain_actor_2=2")
+    scenario = quick_scenario("learner.rule='gradient'", "learner.gain_critic=1e9", *actor_gains)
     station = scenario.station_keeping()
     L_f, gain = drift_bound(station, 500), 1e9
     plain = check(scenario)

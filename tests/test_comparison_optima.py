@@ -23,7 +23,10 @@ from .commands import LOOSE, QUICK
 from .games import HALF_WIDTHS, Array
 
 Check = Callable[[BaseException], str]
-TINY = ("offline.horizon=12", "offline.intervals=6", "offline.degree=4", "offline.aligned=false")
+TINY = (
+    *("offline.horizon=12", "offline.intervals=6", "offline.degree=4", "offline.aligned=false"),
+    *("offline.rounds=1", "offline.starts=0"),
+)
 FIRST = 0.2 * HALF_WIDTHS * np.linspace(-1.0, 1.0, 12)
 CHAIN = np.array([FIRST, -FIRST, 1.03 * FIRST, 1.06 * FIRST])
 """The third starts from the first, the fourth from the third."""
