@@ -34,7 +34,9 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
     station = scenario.station_keeping()
     vehicle = station.model.vehicle
     text = scenario.model_dump_json(include=include)
-    parts = [str(FORMAT), kind, text, vehicle.model_dump_json(), station.fingerprint]
+    learned = include is None or "basis" in include
+    functions = station.fingerprint if learned else station.plant_fingerprint
+    parts = [str(FORMAT), kind, text, vehicle.model_dump_json(), functions]
     parts.append(repr(sorted(versions().items())))
     start = scenario.initial_weights() if include is None else None
     parts.append("" if start is None else start.tobytes().hex())
@@ -45,7 +47,7 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
         "vehicle": vehicle.model_dump_json(),
         "mode": scenario.simulation.mode,
         "seed": scenario.samples.seed,
-        "functions": station.fingerprint,
+        "functions": functions,
         "key": key,
     }
 

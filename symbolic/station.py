@@ -6,6 +6,8 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
+from casadi import SX
+
 from .basis import Basis
 from .compilation import c_source
 from .game import Game
@@ -48,11 +50,15 @@ class StationKeeping:
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of the generated code of f, g and σ: what every compiled function comes from."""
-        expressions = {
-            "f": self.problem.drift,
-            "g": self.problem.input_matrix,
-            "sigma": self.basis.sigma,
-        }
+        return self._hash(sigma=self.basis.sigma)
+
+    @cached_property
+    def plant_fingerprint(self) -> str:
+        """SHA-256 of the generated code of f and g: what an optimum comes from, whatever the basis."""
+        return self._hash()
+
+    def _hash(self, **more: SX) -> str:
+        expressions = {"f": self.problem.drift, "g": self.problem.input_matrix, **more}
         function = dense_function("fingerprint", {"zeta": self.problem.zeta}, expressions)
         return hashlib.sha256(c_source(function).encode()).hexdigest()
 

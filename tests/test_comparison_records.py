@@ -115,6 +115,9 @@ def test_the_optimum_does_not_depend_on_the_learner() -> None:
     other = scenario.with_settings(learner={"rule": "gradient"}, samples={"number": 3})
     assert key(other, OFFLINE_KEY) == before
     assert key(other) != key(scenario)
+    basis = scenario.with_settings(basis={"name": "drag"})
+    assert key(basis, OFFLINE_KEY) == before
+    assert key(basis, OFFLINE_KEY | {"basis"}) != key(scenario, OFFLINE_KEY | {"basis"})
     assert key(scenario.with_settings(offline={"intervals": 9}), OFFLINE_KEY) != before
 
 
