@@ -23,7 +23,7 @@ def newton(problem: Problem, mesh: Mesh) -> Solve:
         solution = solver.solve(zeta0, verify=False)
         if solution.method != "newton":
             raise RuntimeError("Newton's method did not converge")
-        return solution.value
+        return float(solution.value)
 
     return solve
 

@@ -7,6 +7,8 @@ next stage's state.
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi
 import numpy as np
 from casadi import DM, MX
@@ -56,7 +58,7 @@ def build(problem: Problem, mesh: Mesh) -> Solve:
     return solve
 
 
-def _options(n: int, k: int, mesh: Mesh) -> dict[str, object]:
+def _options(n: int, k: int, mesh: Mesh) -> dict[str, Any]:
     """Sizes of the stages, quiet, all constraints equalities."""
     d, K = mesh.degree, mesh.n_intervals
     n_constraints = [n * (d + 1)] + [n * d] * (K - 1) + [0]

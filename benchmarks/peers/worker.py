@@ -105,7 +105,7 @@ class Worker:
         self.rounds: list[list[float]] = []
         self.values: list[float | None] = []
         self._limit = limit
-        self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115 - open as long as the process is
+        self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115 - until `close`
         self._process: subprocess.Popen[str] | None = None
         try:
             self._process = subprocess.Popen(
@@ -157,9 +157,11 @@ class Worker:
         late = not timer.is_alive()
         timer.cancel()
         if not line:
+            process.kill()
+            process.wait()
             self._errors.seek(0)
             said = self._errors.read().strip().splitlines()
-            ending = said[-1][:160] if said else f"exit code {process.wait()}"
+            ending = said[-1][:160] if said else f"exit code {process.returncode}"
             self.reason = f"no answer in {self._limit:.0f} s" if late else f"ended: {ending}"
             return {}
         reply: dict[str, Any] = json.loads(line)

@@ -2,7 +2,7 @@
 
 Exact derivatives are given as functions, differentiated once by CasADi: yapss's own automatic
 derivatives are made anew in every solve, which takes a fifth longer. Without scaled cost and integral
-(by 1e3) IPOPT ends in its restoration phase.
+(by 1e3) IPOPT often ends in its restoration phase.
 """
 
 from __future__ import annotations
