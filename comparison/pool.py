@@ -204,7 +204,7 @@ def _serve(connection: Connection, setup: Callable[[S], Work[T, M]], shipment: S
             for message in work(connection.recv()):
                 connection.send(("message", message))
             connection.send(("done", None))
-    except (EOFError, BrokenPipeError):
+    except (EOFError, ConnectionError):
         return  # nobody is there any more
     except StationkeepError as error:
         connection.send(("bad input" if isinstance(error, InputError) else "failed", str(error)))
