@@ -58,7 +58,7 @@ class PointDerivatives:
     def _nonzeros(self, name: str, matrix: SX, more: dict[str, SX]) -> tuple[casadi.Function, Sparsity]:
         stage = self.stage
         inputs = {"zeta": stage.zeta, "w": stage.w, "parameters": stage.parameters} | more
-        function = dense_function(name, inputs, {"nonzeros": matrix.nz[:]})
+        function = dense_function(name, inputs, {"nonzeros": casadi.vec(matrix.nz[:])})
         if self._compiled:
             try:
                 library = compile_function(function)
