@@ -17,6 +17,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Generic, TypeVar
@@ -181,6 +182,7 @@ class _Pool(Generic[S, T, M]):
 def _as_workers_need_it() -> Iterator[None]:
     """Let a process start with one BLAS thread and deaf to Ctrl-C, which is for its parent."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    resource_tracker.ensure_running()  # when it starts, Python 3.11 lets SIGINT through again
     deaf = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     try:
