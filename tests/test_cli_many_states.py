@@ -21,7 +21,10 @@ from .commands import LOOSE, QUICK, Answer, call, files_in, script, sets
 from .games import HALF_WIDTHS, Array
 
 Capture = pytest.CaptureFixture[str]
-TINY = ("offline.horizon=12", "offline.intervals=6", "offline.degree=4", "offline.aligned=false")
+TINY = (
+    *("offline.horizon=12", "offline.intervals=6", "offline.degree=4", "offline.aligned=false"),
+    *("offline.rounds=1", "offline.starts=0"),
+)
 SETTINGS = sets(*QUICK, *TINY, *LOOSE)
 
 
@@ -189,31 +192,30 @@ def test_killed_at_random_moments_again_and_again(
     assert not [name for name in files_in(user_folder) if Path(name).name.startswith(".")]
 
 
+@pytest.mark.slow
 def test_states_that_fail_are_rows_and_the_others_are_solved(
     user_folder: Path, capsys: Capture
 ) -> None:
-    """From 10 km away nothing converges; a neighbour then starts from the linear policy as well."""
+    """From 10 km away nothing converges."""
     far = np.zeros(12)
     far[0] = 1e4
-    np.save("states.npy", np.array([far, 0.1 * HALF_WIDTHS, 1.01 * far]))
-    words: tuple[str, ...] = ("offline", "--quiet", "--json", "--states", "states.npy", "--out", "out")
-    words += (*SETTINGS, *sets("offline.rounds=1", "offline.starts=0"))
+    np.save("states.npy", np.array([far, 0.1 * HALF_WIDTHS]))
+    words = ("offline", "--quiet", "--json", "--states", "states.npy", "--out", "out", *SETTINGS)
     answer = call(capsys, *words, "--workers", "2")
     assert answer.code == 1
     rows = answer.json()["states"]
-    assert [row["value"] is None for row in rows] == [True, False, True]
-    assert [row["zeta"][0] for row in rows] == [1e4, 0.1 * HALF_WIDTHS[0], 1.01e4]
-    for row in (rows[0], rows[2]):
-        assert "Maximum_Iterations_Exceeded" in row["faults"][0]
-        assert row["certified_seconds"] > 0.0
+    assert [row["value"] is None for row in rows] == [True, False]
+    assert [row["zeta"][0] for row in rows] == [1e4, 0.1 * HALF_WIDTHS[0]]
+    assert "Maximum_Iterations_Exceeded" in rows[0]["faults"][0]
+    assert rows[0]["certified_seconds"] > 0.0
     assert rows[1]["faults"] == []
     with (user_folder / "out" / "offline.csv").open(encoding="utf-8", newline="") as file:
         table = list(csv.DictReader(file))
     assert [float(row["zeta_x"]) for row in table] == [row["zeta"][0] for row in rows]
-    assert [row["value"] for row in table] == ["", str(rows[1]["value"]), ""]
+    assert [row["value"] for row in table] == ["", str(rows[1]["value"])]
     assert [row["faults"] for row in table] == ["; ".join(row["faults"]) for row in rows]
-    assert [row["costate_z_dot"] for row in table] == ["", str(rows[1]["costate"][8]), ""]
-    assert [row["u_control_M"] for row in table] == ["", str(rows[1]["u_control"][4]), ""]
+    assert [row["costate_z_dot"] for row in table] == ["", str(rows[1]["costate"][8])]
+    assert [row["u_control_M"] for row in table] == ["", str(rows[1]["u_control"][4])]
     again = call(capsys, *words, "--workers", "1")
     assert (again.code, again.out) == (1, answer.out)
 

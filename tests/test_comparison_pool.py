@@ -122,10 +122,8 @@ def test_workers_that_leave_or_crash(tmp_path: Path) -> None:
     assert isinstance(fine, int)
 
 
-@pytest.mark.parametrize(
-    ("kind", "name"),
-    [("input", "InputError"), pytest.param("run", "RunError", marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "name"), [("input", "InputError"), ("run", "RunError")])
 def test_an_error_for_the_user_ends_the_run(kind: str, name: str, tmp_path: Path) -> None:
     """The other worker would be busy for a minute."""
     told = Told(tmp_path, 2, f"raise {kind}", "wait")
@@ -144,6 +142,7 @@ def test_closing_ends_the_workers(tmp_path: Path) -> None:
     assert told.err == ""
 
 
+@pytest.mark.slow
 def test_one_worker_is_this_process(tmp_path: Path) -> None:
     told = Told(tmp_path, 1, "fine 1", "fine 2")
     assert told.built == [str(told.pid)]
