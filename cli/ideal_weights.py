@@ -26,9 +26,9 @@ from .output import print_table
 from .solving import solve
 
 LABELS = {
-    "epsilon": "ε = V - W'σ",
-    "epsilon_prime": "ε' = V_ζ - σ''W",
-    "policy": "policy v, in the norm of R_eff",
+    "epsilon": "ε = V - W'σ [cost]",
+    "epsilon_prime": "ε' = V_ζ - σ''W [cost per unit]",
+    "policy": "policy v, norm of R_eff [sqrt(cost/s)]",
 }
 
 
