@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from stationkeep.comparison import excitation
-from stationkeep.comparison.excitation import ExcitationRun, excitation_runs, fixed_point
+from stationkeep.comparison.excitation import PLAIN, ExcitationRun, excitation_runs, fixed_point
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import Basis, Problem
 
@@ -78,7 +78,7 @@ def test_series_have_one_length() -> None:
 @pytest.mark.slow
 def test_the_fixed_point_of_the_linear_game_is_its_riccati_solution() -> None:
     problem, basis, _ = linear_quadratic()
-    settings = quick_scenario().learner.model_copy(update={"leash": 0.0, "weight_factor": 0.5})
+    settings = quick_scenario().learner.model_copy(update=PLAIN)
     samples = draw_samples(0.3 * problem.scale, 120, 3)
     weights = fixed_point(problem, basis, settings, samples)
     expected = basis.quadratic_weights(problem.P)

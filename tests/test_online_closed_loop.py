@@ -63,6 +63,17 @@ def test_shipped_scenario_holds_its_station() -> None:
     half_widths = quick_scenario().station_keeping().half_widths
     assert np.abs(history.zeta[-1] / half_widths).max() < 0.02
     assert history.sample_error[-1] < 0.7 * history.sample_error[0]
+    assert not any(history.projecting)
+
+
+@pytest.mark.slow
+def test_rank_condition_holds_with_the_bellman_error_at_fixed_samples() -> None:
+    """(18) along a minute of the paper's error; costate rows follow the vehicle and don't give it."""
+    settings = ["learner.error=bellman", "learner.safeguard=false", "learner.leash=0.005"]
+    settings += [f"learner.{name}=2.0" for name in ("gain_actor_1", "gain_actor_2", "forgetting")]
+    history = run(Scenario.load("bluerov2-heavy", settings))
+    assert history.stopped is None
+    assert history.sample_error[-1] < 0.7 * history.sample_error[0]
     assert min(margin for margin in history.rank_margin if np.isfinite(margin)) > 0.0
     assert not any(history.projecting)
 
