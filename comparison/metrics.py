@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..offline import DirectSolver
 from ..symbolic import StationKeeping, Vehicle
 from ..symbolic.vehicle import Array
 
@@ -22,7 +23,13 @@ class RunMetrics:
         ζ(T)'P ζ(T) for the rest; None if the run ended early
     regret : (cost - V*) / V*; None without an optimum or if the run ended early
     position_rms : [m]; None if the run ended before it began
+    excursion : largest distance from the station [m]; likewise
     effort : integral of |τ_b force|^2 [N^2 s]
+    energy : electrical energy of the thrusters [J]; None if their power is not known
+    saturated : share of the control steps at which a thruster was asked for more than its limit; None
+        in a run without limits
+    policy_microseconds, policy_mean : median and mean wall time of a policy's step [us]; a policy that
+        learns or predicts only now and then has a much higher mean
     rest_share : part of the cost that is the estimate ζ(T)'P ζ(T)
     peak_thrust : largest share of a thruster's limit that the least-norm allocation asks for [-]
     stopped : why the run ended early, or None
@@ -31,7 +38,12 @@ class RunMetrics:
     cost: float | None
     regret: float | None
     position_rms: float | None
+    excursion: float | None
     effort: float
+    energy: float | None
+    saturated: float | None
+    policy_microseconds: float
+    policy_mean: float
     rest_share: float | None
     peak_thrust: float | None
     stopped: str | None
@@ -50,11 +62,18 @@ def run_metrics(record: xr.Dataset, station: StationKeeping, optimum: float | No
         cost = float(cost_to_date(record)[-1]) + rest
         rest_share = rest / cost if cost > 0.0 else 0.0
     tau_b = record["tau_b"].values
+    distance = np.linalg.norm(zeta[:, :3], axis=1)
+    saturated = record.attrs.get("saturated")
     return RunMetrics(
         cost=cost,
         regret=None if cost is None or optimum is None else (cost - optimum) / optimum,
-        position_rms=float(np.sqrt(np.mean(np.sum(zeta[:, :3] ** 2, axis=1)))) if len(time) else None,
+        position_rms=float(np.sqrt(np.mean(distance**2))) if len(time) else None,
+        excursion=float(distance.max()) if len(time) else None,
         effort=float(np.trapezoid(np.sum(tau_b[:, :3] ** 2, axis=1), time)),
+        energy=energy(record, station.model.vehicle),
+        saturated=None if saturated is None else float(saturated),
+        policy_microseconds=float(record.attrs["policy_microseconds"]),
+        policy_mean=float(record.attrs["policy_microseconds_mean"]),
         rest_share=rest_share,
         peak_thrust=peak_thrust(tau_b, station.model.vehicle),
         stopped=stopped,
@@ -78,6 +97,20 @@ def peak_thrust(tau_b: Array, vehicle: Vehicle) -> float | None:
     return float(np.maximum(thrust / forward, thrust / reverse).max())
 
 
+def energy(record: xr.Dataset, vehicle: Vehicle) -> float | None:
+    """Return the electrical energy of a run [J], each thrust held for its control period.
+
+    Of the recorded thrusts, or without limits of the least-norm ones. None where the power of the
+    thrusters is not known.
+    """
+    if vehicle.thrusters is None:
+        return None
+    limited = "thrust" in record
+    thrust = record["thrust"].values if limited else vehicle.thrusters.thrust(record["tau_b"].values)
+    power = vehicle.thrusters.power(thrust)
+    return None if power is None else float(power[:-1] @ np.diff(record["time"].values))
+
+
 def distribution(regrets: list[float | None]) -> dict[str, Any]:
     """Return median, 90 % quantile and maximum of the finished runs, the number that ended early
     (`diverged`) and the number of all (`n`).
@@ -95,9 +128,25 @@ def distribution(regrets: list[float | None]) -> dict[str, Any]:
     }
 
 
-def dissipation_margin(record: xr.Dataset, station: StationKeeping, V_start: float) -> float:
-    """Return γ^2 ∫ d'W_d d + V(ζ_0) - ∫ (ζ'Qζ + u_1'R u_1) - ζ(T)'P ζ(T); the L2 gain holds if >= 0."""
-    final = record["zeta"].values[-1]
-    stored = float(final @ station.problem.P @ final)
-    spent = float(record["cost"].values[-1])
-    return float(record["attenuated"].values[-1]) + V_start - spent - stored
+def dissipation_margin(record: xr.Dataset, V_start: float, V_end: float) -> float:
+    """Return γ^2 ∫ d'W_d d + V(ζ_0) - ∫ (ζ'Qζ + u_1'R u_1) - V(ζ(T)); the L2 gain holds if >= 0.
+
+    Guaranteed for the optimal u_1 alone: along it r + V_ζ (f + g (u_1 + d)) <= 0 for every d. d is what
+    the disturbance amounts to in the still-water model (see `HeldPlant`), u_1 is without trim, and both
+    integrals are the run's own, integrated with the state.
+    """
+    supplied, spent = (float(record[name].values[-1]) for name in ("attenuated", "cost"))
+    return supplied + V_start - spent - V_end
+
+
+class GameValue:
+    """V* of a game at any state by one structured Newton solve, to about 1e-6 of itself."""
+
+    def __init__(self, station: StationKeeping) -> None:
+        self._solver = DirectSolver(
+            station.problem, horizon=60.0, n_intervals=16, degree=6, grading=6.0
+        )
+
+    def __call__(self, zeta: Array) -> float:
+        """Return V*(ζ); raises RunError where the solver does not converge."""
+        return self._solver.solve(zeta, verify=False).value

@@ -21,7 +21,7 @@ from ..symbolic import InputError, RunError
 from ..symbolic.vehicle import Array
 from .scenario import Scenario
 
-FORMAT = 2  # of the records; raise it when what is in them, or how a run is made, changes
+FORMAT = 3  # of the records; raise it when what is in them, or how a run is made, changes
 OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
 
 
@@ -40,6 +40,8 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
     parts.append(repr(sorted(versions().items())))
     start = scenario.initial_weights() if include is None else None
     parts.append("" if start is None else start.tobytes().hex())
+    driven = scenario.plant_vehicle() if include is None else None
+    parts.append("" if driven is None else driven.model_dump_json())
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     return {
         "kind": kind,

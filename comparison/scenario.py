@@ -178,6 +178,17 @@ class Scenario(Settings):
             )
         return weights
 
+    def plant_vehicle(self) -> Vehicle | None:
+        """Return the vehicle that is driven where it is not the scenario's own, else None.
+
+        Raises
+        ------
+        InputError
+            If there is no such vehicle or its file breaks a rule.
+        """
+        name = self.simulation.plant
+        return None if name is None else self._load_vehicle(name)
+
     @property
     def initial_state(self) -> Array:
         """ζ(0), shape (12,)."""
@@ -185,7 +196,7 @@ class Scenario(Settings):
 
     @cached_property
     def _station_keeping(self) -> StationKeeping:
-        model = Model(self._vehicle(), self.current)
+        model = Model(self._load_vehicle(self.vehicle), self.current)
         half_widths = np.array(self.envelope.half_widths)
         problem = self._problem(model, half_widths)
         _ = problem.P  # refuses a gamma without stabilising solution
@@ -210,9 +221,9 @@ class Scenario(Settings):
                 f"{simulation.pitch_limit:g} deg; start closer to level or raise simulation.pitch_limit"
             )
 
-    def _vehicle(self) -> Vehicle:
-        named = "/" not in self.vehicle and not self.vehicle.endswith(".toml")
-        return Vehicle.load(self.vehicle if named else self._path(self.vehicle))
+    def _load_vehicle(self, name: str) -> Vehicle:
+        named = "/" not in name and not name.endswith(".toml")
+        return Vehicle.load(name if named else self._path(name))
 
     def _problem(self, model: Model, half_widths: Array) -> Problem:
         settings = self.game

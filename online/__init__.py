@@ -1,5 +1,6 @@
 """Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
 
+from .allocation import Allocation, Allocator
 from .closed_loop import History, Policy, run
 from .controller import Controller
 from .disturbance import build_disturbance
@@ -9,17 +10,21 @@ from .samples import draw_samples, rank_margin
 from .settings import (
     DisturbanceSettings,
     LearnerSettings,
+    NoiseSettings,
     SampleSettings,
     SimulationSettings,
 )
 
 __all__ = [
+    "Allocation",
+    "Allocator",
     "Controller",
     "DisturbanceSettings",
     "History",
     "Learner",
     "LearnerSettings",
     "LearnerStep",
+    "NoiseSettings",
     "Policy",
     "SampleSettings",
     "SimulationSettings",

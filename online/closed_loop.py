@@ -9,11 +9,13 @@ from typing import Protocol
 
 import numpy as np
 
-from ..symbolic import InputError, RunError, StationKeeping
+from ..symbolic import InputError, RunError, StationKeeping, Vehicle
 from ..symbolic.vehicle import Array
+from .allocation import Allocator
 from .controller import Controller, ControllerScenario
 from .disturbance import build_disturbance
 from .learner import Learner, LearnerStep
+from .noise import MeasurementNoise
 from .plant import HeldPlant, PlantState
 from .settings import SimulationSettings
 
@@ -26,6 +28,10 @@ class RunScenario(ControllerScenario, Protocol):
     @property
     def simulation(self) -> SimulationSettings:
         """Settings of the run."""
+        ...
+
+    def plant_vehicle(self) -> Vehicle | None:
+        """Return the vehicle that is driven, or None for the one of `station_keeping`."""
         ...
 
 
@@ -54,6 +60,8 @@ class History:
     disturbance: list[Array] = field(default_factory=list)
     cost: list[float] = field(default_factory=list)
     attenuated: list[float] = field(default_factory=list)
+    thrust: list[Array] = field(default_factory=list)
+    saturated: list[bool] = field(default_factory=list)
     learn_time: list[float] = field(default_factory=list)
     bellman_error: list[float] = field(default_factory=list)
     sample_error: list[float] = field(default_factory=list)
@@ -68,6 +76,8 @@ class History:
     remembered: Array | None = None
     stopped: str | None = None
     wall_seconds: float = 0.0
+    policy_median: float = 0.0
+    policy_mean: float = 0.0
 
 
 def run(
@@ -99,8 +109,13 @@ class _Loop:
         self.station: StationKeeping = scenario.station_keeping()
         self.policy = policy
         source = build_disturbance(self.settings.disturbance)
-        self.plant = HeldPlant(self.station, source, self.settings.tolerance)
+        vehicle = scenario.plant_vehicle()
+        self.plant = HeldPlant(self.station, source, self.settings.tolerance, vehicle)
+        limited = self.settings.thruster_limits
+        self.thrusters = Allocator(vehicle or self.station.model.vehicle) if limited else None
+        self.noise = MeasurementNoise(self.settings.noise)
         self.history = History()
+        self.policy_seconds: list[float] = []
         self.state = PlantState(np.array(self.settings.initial_state), 0.0, 0.0)
         self.t = 0.0
 
@@ -115,7 +130,7 @@ class _Loop:
                 self.history.stopped = f"{reason} at t = {self.t:.2f} s"
                 return
             try:
-                tau_b = self.policy.step(self.state.zeta[:6], self.state.zeta[6:], period)
+                tau_b = self._command(period)
             except (InputError, RunError, np.linalg.LinAlgError) as error:
                 self.history.stopped = f"the controller failed at t = {self.t:.2f} s: {error}"
                 return
@@ -131,6 +146,19 @@ class _Loop:
                 return
             if progress is not None:
                 progress(self.t + period)
+
+    def _command(self, period: float) -> Array:
+        """Return what the vehicle gets of the policy's wrench, timed and allocated."""
+        seen = self.noise.measure(self.state.zeta)
+        started = time.perf_counter()
+        tau_b = self.policy.step(seen[:6], seen[6:], period)
+        self.policy_seconds.append(time.perf_counter() - started)
+        if self.thrusters is None:
+            return tau_b
+        given = self.thrusters.allocate(tau_b)
+        self.history.thrust.append(given.thrust)
+        self.history.saturated.append(given.saturated)
+        return given.wrench
 
     def _out_of_bounds(self) -> str | None:
         zeta, settings = self.state.zeta, self.settings
@@ -174,7 +202,10 @@ class _Loop:
         history.actor_2.append(seen.actor_2)
 
     def finish(self) -> None:
-        """Record the weights that the run ended with."""
+        """Record the weights that the run ended with, and the policy's time."""
+        if self.policy_seconds:
+            self.history.policy_median = float(np.median(self.policy_seconds))
+            self.history.policy_mean = float(np.mean(self.policy_seconds))
         if isinstance(self.policy, Controller) and self.policy.learn:
             learner = self.policy.learner
             self._record_learner(learner.observe(self.policy.zeta), learner, last=True)

@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 from casadi import DM, SX
 
-from ..symbolic import RunError, StationKeeping
+from ..symbolic import RunError, StationKeeping, Vehicle
 from ..symbolic.dynamics import acceleration, earth_frame
 from ..symbolic.integration import integrate
 from ..symbolic.kernel import dense_function, export
@@ -40,17 +40,22 @@ class HeldPlant:
 
     The thrusters hold a body wrench τ_b; the earth-frame control that costs is
     u_1 = J^-T τ_b - u_trim. The disturbance that is attenuated is what any disturbance amounts to in
-    the still-water model, d = M_bar (η_ddot - η_ddot of the model under τ_b): J^-T τ_d for a force,
-    and the added drag and inertia for moving water.
+    the still-water model, d = M_bar η_ddot + C_bar η_dot + D_bar η_dot + g_bar - J^-T τ_b, evaluated as
+    M_bar (η_ddot - η_ddot of the model under τ_b): J^-T τ_d for a force, the added drag and inertia for
+    moving water, and where `vehicle` is another one than the model's, what the two differ by.
     """
 
     def __init__(
-        self, station: StationKeeping, source: DisturbanceSource, tolerance: float = 1e-8
+        self,
+        station: StationKeeping,
+        source: DisturbanceSource,
+        tolerance: float = 1e-8,
+        vehicle: Vehicle | None = None,
     ) -> None:
         self.station = station
         self.source = source
         self.tolerance = tolerance
-        self._kernel, _ = export(_held_rates(station), compiled=station.model.compiled)
+        self._kernel, _ = export(_held_rates(station, vehicle), compiled=station.model.compiled)
         self._current = np.array(station.model.current)
 
     def rates(self, t: float, zeta: Array, tau_b: Array, tau_d: Array) -> tuple[Array, Array, Array]:
@@ -96,15 +101,15 @@ class HeldPlant:
         return lambda t, y: self.rates(min(t, last), y[:12], tau_b, tau_d)[0]
 
 
-def _held_rates(station: StationKeeping) -> casadi.Function:
-    """Return ζ_dot, the cost rates, u_1 and d under held body wrenches, as one function."""
+def _held_rates(station: StationKeeping, true: Vehicle | None = None) -> casadi.Function:
+    """Return ζ_dot of the true vehicle, the cost rates, u_1 and d under held body wrenches."""
     model, game = station.model, station.game
     vehicle, zeta = model.vehicle, model.zeta
     tau_b, tau_d = SX.sym("tau_b", 6), SX.sym("tau_d", 6)
     force = SX.sym("force", 6)
     water, water_rate = SX.sym("water_velocity", 3), SX.sym("water_acceleration", 3)
     J = jacobian(zeta[:6])
-    actual = acceleration(vehicle, zeta, tau_b + tau_d + J.T @ force, water, water_rate)
+    actual = acceleration(true or vehicle, zeta, tau_b + tau_d + J.T @ force, water, water_rate)
     modelled = acceleration(vehicle, zeta, tau_b, SX(DM(model.current)), SX(3, 1))
     M_bar = earth_frame(vehicle, zeta[:6], zeta[6:]).M_bar
     disturbance = M_bar @ (actual - modelled)

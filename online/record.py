@@ -35,7 +35,9 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     """Return the record of a run.
 
     Dimensions: `time` (control steps), `learn_time` (learning steps, each with the weights before it,
-    and the end of the run), `state`, `force`, `basis`.
+    and the end of the run), `state`, `force`, `basis`, and with thruster limits `thruster`. `tau_b` is
+    the wrench that the vehicle got. Attributes: `saturated`, the share of the control steps at which
+    the least-norm thrusts exceeded a limit; median and mean wall time of a policy's step [us].
     """
     m = len(history.critic[0]) if history.critic else 0
 
@@ -69,7 +71,7 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     }
     if history.remembered is not None:
         data["remembered"] = (("basis",), history.remembered, {"units": "cost"})
-    return xr.Dataset(data, coordinates, attributes)
+    return _with_actuation(xr.Dataset(data, coordinates, attributes), history)
 
 
 def _variables(
@@ -96,6 +98,18 @@ def _variables(
         "actor_1": (weights, stack("actor_1", m), "cost"),
         "actor_2": (weights, stack("actor_2", m), "cost"),
     }
+
+
+def _with_actuation(record: xr.Dataset, history: History) -> xr.Dataset:
+    """Return the record with thrusts and the times of the policy."""
+    n_time = record.sizes["time"]
+    if history.thrust:
+        thrust = np.array(history.thrust[:n_time]).reshape(n_time, -1)
+        record["thrust"] = (("time", "thruster"), thrust, {"units": "N"})
+        record.attrs["saturated"] = float(np.mean(history.saturated))
+    record.attrs["policy_microseconds"] = 1e6 * history.policy_median
+    record.attrs["policy_microseconds_mean"] = 1e6 * history.policy_mean
+    return record
 
 
 def versions() -> dict[str, str]:

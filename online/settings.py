@@ -143,6 +143,23 @@ class DisturbanceSettings(Settings):
     seed: NonNegativeInt = 1
 
 
+class NoiseSettings(Settings):
+    """Standard deviations of the white noise on what the policy sees at each control step.
+
+    Attributes
+    ----------
+    position, attitude : of η [m], [rad]
+    velocity, rate : of η_dot [m/s], [rad/s]
+    seed : of the noise
+    """
+
+    position: NonNegativeFloat = 0.0
+    attitude: NonNegativeFloat = 0.0
+    velocity: NonNegativeFloat = 0.0
+    rate: NonNegativeFloat = 0.0
+    seed: NonNegativeInt = 1
+
+
 class SimulationSettings(Settings):
     """One closed-loop run.
 
@@ -157,6 +174,10 @@ class SimulationSettings(Settings):
     chi : the run ends when a state exceeds this multiple of the full envelope's half-width
     monitor_every : learning steps between two looks at the rank margin
     seed : of the envelope states that `compare` adds
+    plant : the vehicle that is driven, a shipped name or the path of a TOML file; the scenario's own,
+        which the controller is made for, when not given
+    thruster_limits : whether the plant gets what its thrusters can give instead of what is asked for
+    noise : on what the policy sees
     """
 
     initial_state: tuple[float, ...] = Field(min_length=12, max_length=12)
@@ -168,4 +189,7 @@ class SimulationSettings(Settings):
     chi: PositiveFloat = 2.0
     monitor_every: PositiveInt = 4
     seed: NonNegativeInt = 1
+    plant: str | None = None
+    thruster_limits: bool = False
+    noise: NoiseSettings = NoiseSettings()
     disturbance: DisturbanceSettings = DisturbanceSettings()

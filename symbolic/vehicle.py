@@ -34,10 +34,12 @@ class Thrusters(Settings):
     ----------
     allocation : 6 rows X Y Z K M N, one column a thruster [-], [m]
     limits : [reverse, forward] thrust of every thruster [N]
+    full_power : electrical power of a thruster at either limit [W]; None if it is not known
     """
 
     allocation: list[list[float]]
     limits: tuple[float, float]
+    full_power: Positive | None = None
 
     @field_validator("allocation")
     @classmethod
@@ -67,6 +69,18 @@ class Thrusters(Settings):
     def thrust(self, tau_b: Array) -> Array:
         """Return the least-norm thrusts [N] that give the body wrench; shape (..., n_thrusters)."""
         return tau_b @ np.linalg.pinv(self.matrix).T
+
+    def power(self, thrust: Array) -> Array | None:
+        """Return the electrical power of all thrusters together, shape (...,) [W].
+
+        P (|T| / T_limit)^(3/2) each, with the limit of the direction: momentum theory of a propeller at
+        rest (ideal power T^(3/2) / sqrt(2 ρ A)), scaled to the measured power P at the limits.
+        """
+        if self.full_power is None:
+            return None
+        reverse, forward = self.limits
+        share = np.maximum(thrust / forward, thrust / reverse)
+        return np.asarray(self.full_power * np.sum(share**1.5, axis=-1))
 
 
 class Vehicle(Settings):

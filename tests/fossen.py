@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 E1, E2, E3 = np.eye(3)
-SHIPPED = ("bluerov2-heavy", "bluerov2-heavy-buoyant", "rexrov")
+SHIPPED = ("bluerov2-heavy", "bluerov2-heavy-buoyant", "bluerov2-heavy-2024", "rexrov")
 
 
 def read_parameters(name: str) -> dict[str, Any]:

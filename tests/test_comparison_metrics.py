@@ -11,9 +11,11 @@ import xarray as xr
 from casadi import collocation_points
 from scipy.integrate import quad, trapezoid
 from stationkeep.comparison.metrics import (
+    GameValue,
     cost_to_date,
     dissipation_margin,
     distribution,
+    energy,
     peak_thrust,
     run_metrics,
 )
@@ -126,13 +128,15 @@ def test_dissipation_from_rest() -> None:
     """From V(0) = 0 the L2 gain is below γ: what is spent and stored is less than γ^2 ∫ d'W_d d."""
     record, station = disturbed(), quick_scenario().station_keeping()
     assert record.attrs["stopped"] == ""
-    margin = dissipation_margin(record, station, 0.0)
+    value, zeta = GameValue(station), record["zeta"].values
+    assert value(zeta[0]) == 0.0
+    margin = dissipation_margin(record, 0.0, value(zeta[-1]))
     assert margin > 0.0
-    game, P = station.game, station.problem.P
+    game = station.game
     zeta, u, d = (record[name].values for name in ("zeta", "u_control", "u_disturbance"))
     spent = np.sum((zeta @ game.Q) * zeta, axis=1) + np.sum((u @ game.R) * u, axis=1)
     supplied = game.gamma**2 * np.sum((d @ game.W_d) * d, axis=1)
-    expected = trapezoid(supplied - spent, record["time"].values) - zeta[-1] @ P @ zeta[-1]
+    expected = trapezoid(supplied - spent, record["time"].values) - value(zeta[-1])
     assert margin == pytest.approx(expected, rel=0.02)
     assert np.abs(zeta[-1]).max() > 0.01, "the force must have moved the vehicle"
 
@@ -144,9 +148,11 @@ def test_dissipation_from_a_state() -> None:
     station = scenario.station_keeping()
     record = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
     start = float(optimum().attrs["value"])
-    margin = dissipation_margin(record, station, start)
+    assert GameValue(station)(scenario.initial_state) == pytest.approx(start, rel=1e-5)
+    end = GameValue(station)(record["zeta"].values[-1])
+    margin = dissipation_margin(record, start, end)
     assert margin > 0.0
-    assert dissipation_margin(record, station, start + 1.0) - margin == pytest.approx(1.0)
+    assert dissipation_margin(record, start + 1.0, end) - margin == pytest.approx(1.0)
     assert record["attenuated"].values[-1] == pytest.approx(40.0)  # γ^2 d^2 T = 4 · 1 N^2 · 10 s
 
 
@@ -211,3 +217,25 @@ def test_position_and_effort() -> None:
     force = np.linalg.norm(record["tau_b"].values[:, :3], axis=1)
     assert metrics.effort == pytest.approx(trapezoid(force**2, record["time"].values))
     assert metrics.regret is None
+
+
+def test_energy_of_a_constant_thrust() -> None:
+    """Full power at either limit, 385 W each; a quarter of the thrust takes an eighth of it."""
+    thrust = np.tile([51.5, -39.9, 51.5 / 4, -39.9 / 4, 0, 0, 0, 0], (11, 1))
+    time = 0.5 * np.arange(11)
+    record = xr.Dataset({"thrust": (("time", "thruster"), thrust)}, {"time": time})
+    vehicle = Vehicle.load("bluerov2-heavy")
+    assert energy(record, vehicle) == pytest.approx(385.0 * (1 + 1 + 1 / 8 + 1 / 8) * 5.0)
+    heave = np.zeros((11, 6))
+    heave[:, 2] = -4 * 51.5 / 4
+    record = xr.Dataset({"tau_b": (("time", "force"), heave)}, {"time": time})
+    assert energy(record, vehicle) == pytest.approx(4 * 385.0 / 8 * 5.0)
+    assert energy(record, Vehicle.load("rexrov")) is None
+
+
+def test_excursion_and_the_time_of_a_step() -> None:
+    metrics = run_metrics(learned(), quick_scenario().station_keeping(), None)
+    start = quick_scenario().initial_state[:3]
+    assert metrics.excursion == pytest.approx(np.linalg.norm(start), rel=1e-3)
+    assert 0.0 < metrics.policy_microseconds < metrics.policy_mean
+    assert metrics.saturated is None
