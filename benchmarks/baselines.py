@@ -2,11 +2,12 @@
 
     python benchmarks/baselines.py [--states N] [--duration T] [--json FILE]
 
-First table: undisturbed, from seeded states of the envelope, cost of the single-player equivalent (how
-policies without a disturbance player are driven there: `comparison/policies.py`). Second table: from
-rest at the station in currents and waves, with thruster limits, measurement noise and another vehicle as
-the plant switched on one by one and together. Runs that end early are counted, not dropped: their other
-figures are those up to that moment. The dissipation margin is guaranteed for the optimal u_1 only.
+First table: undisturbed, from seeded states of the envelope, cost of the single-player equivalent
+(how policies without a disturbance player are driven there: `comparison/policies.py`). Second table:
+from rest at the station in currents and waves, with thruster limits, measurement noise and another
+vehicle as the plant, one by one and together. Runs that end early are counted, not dropped: their
+other figures are those up to that moment. The dissipation margin is guaranteed for the optimal u_1
+only.
 """
 
 from __future__ import annotations
@@ -91,7 +92,8 @@ def undisturbed(scenario: Scenario, n_states: int) -> list[dict[str, Any]]:
     optima = [value(state) for state in states]
     header = (
         f"{'policy':<14}{'regret [%]: median':>19}{'90 %':>7}{'max':>7}{'failed':>8}{'rms [m]':>9}"
-        f"{'max [m]':>9}{'effort':>9}{'energy [J]':>12}{'us/step: median':>17}{'mean':>7}{'lost solves':>13}"
+        f"{'max [m]':>9}{'effort':>9}{'energy [J]':>12}{'us/step: median':>17}{'mean':>7}"
+        f"{'lost solves':>13}"
     )
     print(f"undisturbed, {n_states} states of scale {scenario.envelope.scale:g}\n{header}")
     rows = []
@@ -134,8 +136,9 @@ def median(found: list[RunMetrics], name: str) -> float:
 def disturbed(scenario: Scenario, duration: float) -> list[dict[str, Any]]:
     """Print and return the second table."""
     print(
-        f"\nfrom rest, {duration:g} s disturbed\n{'disturbance':<18}{'with':<11}{'policy':<14}{'rms [m]':>8}"
-        f"{'max [m]':>9}{'energy [J]':>12}{'saturated [%]':>15}{'margin':>11}{'/supplied [%]':>15}  ended early"
+        f"\nfrom rest, {duration:g} s disturbed\n{'disturbance':<18}{'with':<11}{'policy':<14}"
+        f"{'rms [m]':>8}{'max [m]':>9}{'energy [J]':>12}{'saturated [%]':>15}{'margin':>11}"
+        f"{'/supplied [%]':>15}  ended early"
     )
     value, rows = GameValue(scenario.station_keeping()), []
     for name, disturbance in disturbances().items():
