@@ -181,6 +181,9 @@ class SamePlant:
     def initial_weights(self) -> Array | None:
         return None
 
+    def plant_vehicle(self) -> None:
+        return None
+
 
 def test_closed_loop_of_the_game_is_that_of_its_single_player() -> None:
     """The applied force û_1 + û_2 is v̂, and the game's cost is the single player's."""
