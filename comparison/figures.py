@@ -206,9 +206,7 @@ def draw_cost(path: Path, records: dict[str, xr.Dataset], optimal: xr.Dataset) -
 
 def draw_excitation(path: Path, runs: dict[str, list[ExcitationRun]]) -> Path:
     """Draw excitation, rank margin and weight error without and with samples, one row a plant."""
-    title = (
-        "No persistence of excitation: runs with and without sample points (x: run left the envelope)"
-    )
+    title = "No persistence of excitation: with and without sample points (x: left the envelope)"
     with figure(path, title, len(runs), 3, 2.6 * len(runs) + 0.6) as panels:
         for row, (plant, group) in enumerate(runs.items()):
             excited, margin, error = panels[3 * row : 3 * row + 3]

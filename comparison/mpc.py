@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..offline.grid import Grid
 from ..offline.mesh import graded_mesh
 from ..offline.newton import StructuredNewton
-from ..offline.stages import Grid
 from ..offline.trajectory import Trajectory
 from ..symbolic import InputError, RunError, StationKeeping
 from ..symbolic.vehicle import Array
@@ -63,8 +63,7 @@ class ModelPredictive(Baseline):
         self._newton = StructuredNewton(problem, compiled=station.model.compiled)
         mesh = graded_mesh(s.horizon, s.intervals, s.grading)
         self._grid = Grid(mesh, s.degree, problem.n_inputs)
-        _, B = problem.linearization
-        self._linear = -problem.game.R_eff_inverse @ B.T @ problem.P
+        self._linear = problem.linear_gain
         self._plan: Trajectory | None = None
         self._age = np.inf  # of the plan [s]
         self._since = np.inf  # the last solve was tried [s]

@@ -122,7 +122,7 @@ def certificate(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     """Return header and rows of the optimum's certificate."""
     attributes = comparison.optimal.attrs
     meanings = {
-        "value_error": "relative error of the value: mesh, re-integration and horizon",
+        "value_error": "relative error of the value: mesh, re-integration, horizon and saddle point",
         "defect": "gap of the re-integrated trajectory, in half-widths",
         "hji_residual": "residual of the HJI (7), relative to the state cost",
         "costate_error": "costate against a finite difference of the value, relative",

@@ -21,8 +21,7 @@ import scipy.sparse
 from casadi import DM, MX, SX, Sparsity
 from numpy.typing import NDArray
 
-from ..symbolic.compilation import CompilationError, compile_function
-from ..symbolic.kernel import dense_function, say_once
+from ..symbolic.kernel import dense_function, export
 from ..symbolic.vehicle import Array
 from .radau import RadauRule
 from .stage import Stage
@@ -59,13 +58,8 @@ class PointDerivatives:
         stage = self.stage
         inputs = {"zeta": stage.zeta, "w": stage.w, "parameters": stage.parameters} | more
         function = dense_function(name, inputs, {"nonzeros": casadi.vec(matrix.nz[:])})
-        if self._compiled:
-            try:
-                library = compile_function(function)
-                function = casadi.external(name, str(library.path))
-            except (CompilationError, RuntimeError) as error:
-                say_once(f"{error}; using CasADi's virtual machine, about 10 times slower")
-        return function, matrix.sparsity()
+        kernel, _ = export(function, compiled=self._compiled)
+        return kernel.function, matrix.sparsity()
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,24 +8,23 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import cached_property
 
 import numpy as np
 
 from ..symbolic import Problem, RunError, require_state
 from ..symbolic.vehicle import Array
 from .derivatives import PointDerivatives
+from .grid import Grid
 from .guess import LinearStart
 from .mesh import aligned_mesh, graded_mesh
 from .newton import StructuredNewton
 from .plant import Plant
+from .settings import Method
 from .stage import single_player
-from .stages import Grid
 from .trajectory import Trajectory
 from .transcription import Transcription
 from .verification import reintegrate, sign_changes
-
-Method = Literal["newton", "ipopt"]
 
 
 @dataclass(frozen=True)
@@ -131,7 +130,8 @@ class DirectSolver:
         started = time.perf_counter()
         found = None
         if self._newton is not None:
-            grid = Grid(mesh, degree, self.problem.n_inputs)
+            own = mesh is self.mesh and degree == self.degree
+            grid = self._own_grid if own else Grid(mesh, degree, self.problem.n_inputs)
             try:
                 found = self._by_newton(self._newton, zeta0, grid, guess)
             except RunError:
@@ -238,6 +238,10 @@ class DirectSolver:
             method="ipopt",
             iterations=found.iterations,
         )
+
+    @cached_property
+    def _own_grid(self) -> Grid:
+        return Grid(self.mesh, self.degree, self.problem.n_inputs)
 
     def _program(self, n_intervals: int, degree: int) -> Transcription:
         key = (n_intervals, degree)

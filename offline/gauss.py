@@ -59,22 +59,6 @@ class GaussRule:
         return np.asarray(mesh[:-1, None] + np.diff(mesh)[:, None] * self.nodes)
 
 
-def interpolate(points: Array, mesh: Array, values: Array, times: Array) -> Array:
-    """Return piecewise polynomials at given times, shape (len, w).
-
-    Parameters
-    ----------
-    points : (m,) where the values are on an interval, in (0, 1)
-    mesh : (K + 1,) [s]
-    values : (K, m, w)
-    times : [s]; the first and the last polynomial go on outside the mesh
-    """
-    owner = np.clip(np.searchsorted(mesh, times, side="right") - 1, 0, len(mesh) - 2)
-    within = (times - mesh[owner]) / (mesh[owner + 1] - mesh[owner])
-    rows = legendre.legvander(2.0 * within - 1.0, len(points) - 1) @ _coefficients(points)
-    return np.asarray(np.einsum("tm,tmw->tw", rows, values[owner]))
-
-
 def _coefficients(points: Array) -> Array:
     """Return the matrix from values at points of (0, 1) to Legendre coefficients."""
     return np.asarray(np.linalg.inv(legendre.legvander(2.0 * points - 1.0, len(points) - 1)))

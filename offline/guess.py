@@ -10,6 +10,7 @@ from casadi import DM, SX
 
 from ..symbolic import Problem
 from ..symbolic.batch import BatchKernel
+from ..symbolic.integration import runge_kutta_step
 from ..symbolic.kernel import dense_function
 from ..symbolic.vehicle import Array
 
@@ -24,10 +25,7 @@ class LinearStart:
     def __init__(self, problem: Problem, *, compiled: bool = True) -> None:
         self.problem = problem
         self._compiled = compiled
-        A, B = problem.linearization
-        self.gain = -problem.game.R_eff_inverse @ B.T @ problem.P
-        fastest = float(np.abs(np.linalg.eigvals(A + B @ self.gain)).max())
-        self.longest_step = 0.6 / fastest
+        self.longest_step = 0.6 / float(np.abs(problem.closed_loop_modes).max())
 
     def sample(self, zeta0: Array, times: Array) -> tuple[Array, Array, Array]:
         """Return states (N, n), v (N, k) and ζ_dot (N, n) at ascending times > 0.
@@ -45,7 +43,7 @@ class LinearStart:
         if lost.any():
             first = int(np.argmax(lost))
             path[first:] = zeta0 * np.exp(-times[first:, None])
-        v = path @ self.gain.T
+        v = path @ self.problem.linear_gain.T
         (rate,) = self._rate(path)
         return path, v, rate
 
@@ -62,17 +60,13 @@ class LinearStart:
     def _step(self) -> BatchKernel:
         """One classical Runge-Kutta step of length h."""
         zeta, h, rate = self.problem.zeta, SX.sym("h"), self._closed_loop()
-        k_1 = rate(zeta)
-        k_2 = rate(zeta + h / 2 * k_1)
-        k_3 = rate(zeta + h / 2 * k_2)
-        k_4 = rate(zeta + h * k_3)
-        after = zeta + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+        after = runge_kutta_step(rate, zeta, h)
         function = dense_function("linear_step", {"zeta": zeta, "h": h}, {"after": after})
         return BatchKernel(function, compiled=self._compiled)
 
     def _closed_loop(self) -> casadi.Function:
         problem = self.problem
-        v = DM(self.gain) @ problem.zeta
+        v = DM(problem.linear_gain) @ problem.zeta
         return casadi.Function(
             "closed_loop", [problem.zeta], [problem.drift + problem.input_matrix @ v]
         )

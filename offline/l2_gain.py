@@ -20,7 +20,7 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from ..symbolic import InputError, Kernel, RunError
-from ..symbolic.integration import integrate
+from ..symbolic.integration import integrate, runge_kutta_step
 from ..symbolic.kernel import dense_function
 from ..symbolic.vehicle import Array
 from .policy import ControlPolicy
@@ -129,11 +129,7 @@ class GainMeter:
         problem, h = self.problem, self.step
         d, field = SX.sym("d", problem.n_inputs), self._field
         start = SX.sym("y", problem.n_states + 1)
-        k_1 = field(start, d)
-        k_2 = field(start + h / 2 * k_1, d)
-        k_3 = field(start + h / 2 * k_2, d)
-        k_4 = field(start + h * k_3, d)
-        end = start + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+        end = runge_kutta_step(lambda y: field(y, d), start, h)
         step = casadi.Function("step", [start, d], [end])
         inputs = MX.sym("disturbance", problem.n_inputs, self.n_steps)
         path = step.mapaccum("path", self.n_steps)(DM.zeros(problem.n_states + 1), inputs)

@@ -29,8 +29,8 @@ from ..symbolic import InputError, Problem, RunError
 from ..symbolic.batch import BatchKernel
 from ..symbolic.kernel import dense_function
 from ..symbolic.vehicle import Array
+from .grid import Bent, Grid, Pass, adjoint, backward
 from .guess import LinearStart
-from .stages import Bent, Grid, Pass, adjoint, backward
 
 
 @dataclass(frozen=True)
@@ -204,16 +204,14 @@ class StructuredNewton:
 
     def _backward(self, grid: Grid, model: _Model, hessian: Array) -> Pass | Bent:
         P = 2.0 * self.problem.P
-        inertia = self._inertia(grid)
-        return backward(grid, hessian, model.gradient, P, P @ model.end, inertia)
+        return backward(grid, hessian, model.gradient, P, P @ model.end, self._inertia)
 
-    def _inertia(self, grid: Grid) -> Array:
-        """Second derivative of v'R_eff v in a_i1 ... a_id at rest, (K, d k, d k)."""
+    @cached_property
+    def _inertia(self) -> Array:
+        """Second derivative of v'R_eff v in the acceleration at rest, (k, k)."""
         _, B = self.problem.linearization
-        inverse = np.linalg.inv(B[grid.k :])
-        block = 2.0 * inverse.T @ self.problem.game.R_eff @ inverse
-        full = np.einsum("ij,jl,pq->ijplq", grid.weights, np.eye(grid.degree), block)
-        return np.asarray(full.reshape(grid.K, grid.degree * grid.k, -1))
+        inverse = np.linalg.inv(B[self.problem.n_inputs :])
+        return np.asarray(2.0 * inverse.T @ self.problem.game.R_eff @ inverse)
 
     def _search(
         self, zeta0: Array, grid: Grid, current: _Model, step: Array, promised: float

@@ -45,8 +45,7 @@ class Plant:
 
     def linear_policy(self, zeta: Array) -> Array:
         """Return v of the linear H-infinity policy, -R_eff^-1 B'P ζ, shape (k,)."""
-        _, B = self.problem.linearization
-        return np.asarray(-self.problem.game.R_eff_inverse @ B.T @ self.problem.P @ zeta)
+        return np.asarray(self.problem.linear_gain @ zeta)
 
     def simulate(
         self,

@@ -42,34 +42,8 @@ class RadauRule:
         derivative, _ = self.coefficients
         return np.asarray(np.linalg.inv(derivative[1:]).T, dtype=np.float64)
 
-    @cached_property
-    def _with_start(self) -> tuple[Array, Array]:
-        points = np.append(0.0, self.nodes)
-        return points, _barycentric_weights(points)
-
-    @cached_property
-    def _without_start(self) -> tuple[Array, Array]:
-        return self.nodes, _barycentric_weights(self.nodes)
-
-    def interpolation(self, tau: Array, *, start: bool) -> Array:
-        """Return the Lagrange polynomials of the nodes at `tau`, (len(tau), d), or d + 1 with 0."""
-        points, weights = self._with_start if start else self._without_start
-        gaps = tau[:, None] - points
-        exact = gaps == 0.0
-        terms = weights / np.where(exact, 1.0, gaps)
-        rows = terms / terms.sum(axis=1, keepdims=True)
-        hit = exact.any(axis=1)
-        rows[hit] = exact[hit]
-        return np.asarray(rows)
-
 
 @cache
 def radau_rule(degree: int) -> RadauRule:
     """Return the rule of a degree, computed once."""
     return RadauRule(degree)
-
-
-def _barycentric_weights(points: Array) -> Array:
-    gaps = points[:, None] - points
-    np.fill_diagonal(gaps, 1.0)
-    return np.asarray(1.0 / gaps.prod(axis=1))

@@ -19,7 +19,8 @@ from ..symbolic import Problem, RunError, require_state
 from ..symbolic.vehicle import Array
 from .boundary import BoundaryProblem, Unknowns
 from .extremal_field import ExtremalField
-from .gauss import GaussRule, interpolate
+from .gauss import GaussRule
+from .interpolation import interpolate
 from .mesh import aligned_mesh, graded_mesh
 from .plant import Plant
 from .verification import sign_changes

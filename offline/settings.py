@@ -8,6 +8,8 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 
 from ..symbolic.settings import Settings
 
+Method = Literal["newton", "ipopt"]
+
 
 class OfflineSettings(Settings):
     """Collocation of the offline optimum.
@@ -36,7 +38,7 @@ class OfflineSettings(Settings):
     aligned: bool = True
     rounds: PositiveInt = 5
     starts: NonNegativeInt = 4
-    method: Literal["newton", "ipopt"] = "newton"
+    method: Method = "newton"
     value_tolerance: PositiveFloat = 1e-7
     defect_tolerance: PositiveFloat = 1e-6
     hji_tolerance: PositiveFloat = 1e-7

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BarycentricInterpolator
 
 from ..symbolic import Game
 from ..symbolic.vehicle import Array
+from .interpolation import barycentric_weights, interpolate
 from .radau import RadauRule, radau_rule
 
 
@@ -58,32 +58,28 @@ class Trajectory:
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         """Return states (len, n) and v (len, k) at times >= 0, by the polynomials; rest beyond T."""
-        owner, tau = self._locate(times)
-        points = owner[:, None] * self.degree + np.arange(self.degree + 1)
-        at_states = self.rule.interpolation(tau, start=True)
-        at_inputs = self.rule.interpolation(tau, start=False)
-        states = np.einsum("tj,tji->ti", at_states, self.states[points])
-        inputs = np.einsum("tj,tji->ti", at_inputs, self.v[points[:, :-1]])
+        states = interpolate(np.append(0.0, self.rule.nodes), self.mesh, self._by_interval, times)
+        v = self.v.reshape(-1, self.degree, self.v.shape[1])
+        inputs = interpolate(self.rule.nodes, self.mesh, v, times)
         beyond = times > self.mesh[-1]
         states[beyond], inputs[beyond] = 0.0, 0.0
         return states, inputs
 
     def accelerations(self, times: Array) -> Array:
         """Return the derivative of the lower half of the states, (len, n/2), by the polynomials."""
-        owner, tau = self._locate(times)
         derivative, _ = self.rule.coefficients
-        points = owner[:, None] * self.degree + np.arange(self.degree + 1)
-        half = self.states.shape[1] // 2
-        slopes = np.einsum("tji,jl->tli", self.states[points][..., half:], derivative)
-        at_nodes = slopes / np.diff(self.mesh)[owner, None, None]
-        found = np.einsum("tj,tji->ti", self.rule.interpolation(tau, start=False), at_nodes)
+        velocities = self._by_interval[..., self.states.shape[1] // 2 :]
+        slopes = np.einsum("kji,jl->kli", velocities, derivative) / np.diff(self.mesh)[:, None, None]
+        found = interpolate(self.rule.nodes, self.mesh, slopes, times)
         found[times > self.mesh[-1]] = 0.0
-        return np.asarray(found)
+        return found
 
-    def _locate(self, times: Array) -> tuple[NDArray[np.intp], Array]:
-        """Return the interval of each time, and where in it, 0 to 1."""
-        owner = np.clip(np.searchsorted(self.mesh, times, side="right") - 1, 0, len(self.mesh) - 2)
-        return owner, (times - self.mesh[owner]) / np.diff(self.mesh)[owner]
+    @property
+    def _by_interval(self) -> Array:
+        """States at the start and the points of each interval, (K, d + 1, n)."""
+        d = self.degree
+        first = np.arange(0, len(self.states) - 1, d)
+        return np.asarray(self.states[first[:, None] + np.arange(d + 1)])
 
     def input_polynomial(self, interval: int) -> BarycentricInterpolator:
         """Return v of an interval as a polynomial of degree d - 1."""
@@ -100,5 +96,4 @@ class Trajectory:
 
 def _polynomial(nodes: Array, values: Array) -> BarycentricInterpolator:
     # weights of our own: scipy takes the nodes in a random order, and rounds as that comes
-    gaps = (nodes[:, None] - nodes) / (np.ptp(nodes) or 1.0) + np.eye(len(nodes))
-    return BarycentricInterpolator(nodes, values, wi=1.0 / np.prod(gaps, axis=1))
+    return BarycentricInterpolator(nodes, values, wi=barycentric_weights(nodes))

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
+from casadi import MX, SX
 from scipy.integrate import solve_ivp
 
 from .errors import RunError
 from .vehicle import Array
+
+E = TypeVar("E", SX, MX)
+
+
+def runge_kutta_step(rate: Callable[[E], E], y: E, h: E | float) -> E:
+    """Return y after one step of the classical fourth-order Runge-Kutta method, as an expression."""
+    k_1 = rate(y)
+    k_2 = rate(y + h / 2 * k_1)
+    k_3 = rate(y + h / 2 * k_2)
+    k_4 = rate(y + h * k_3)
+    return y + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
 
 
 def integrate(

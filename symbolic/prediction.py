@@ -22,6 +22,7 @@ import numpy as np
 from casadi import DM, MX, SX
 
 from .basis import Basis
+from .integration import runge_kutta_step
 from .kernel import Kernel, dense_function
 from .problem import Problem
 from .vehicle import Array
@@ -123,11 +124,7 @@ class Prediction:
         n, m = self.problem.n_states, self.basis.n_basis
         y, dt = MX.sym("y", n + 2), MX.sym("dt")
         weights = MX.sym("actor_1", m), MX.sym("actor_2", m)
-        k_1 = self._rates(y, *weights)
-        k_2 = self._rates(y + dt / 2 * k_1, *weights)
-        k_3 = self._rates(y + dt / 2 * k_2, *weights)
-        k_4 = self._rates(y + dt * k_3, *weights)
-        moved = y + dt / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+        moved = runge_kutta_step(lambda at: self._rates(at, *weights), y, dt)
         inside = casadi.mmax(casadi.fabs(moved[:n] / DM(self.problem.scale))) < BOUND
         return casadi.Function("step", [y, *weights, dt], [casadi.if_else(inside, moved, y)])
 

@@ -8,6 +8,7 @@ from functools import cached_property
 import casadi
 import numpy as np
 from casadi import DM, SX
+from numpy.typing import NDArray
 
 from . import riccati
 from .errors import GammaTooSmallError, InputError
@@ -107,10 +108,21 @@ class Problem:
         return riccati.gamma_derivative(*self.linearization, self.game, self.P)
 
     @cached_property
+    def linear_gain(self) -> Array:
+        """-R_eff^-1 B'P, (k, n): v of the linear H-infinity policy is this times ζ."""
+        _, B = self.linearization
+        return np.asarray(-self.game.R_eff_inverse @ B.T @ self.P)
+
+    @cached_property
+    def closed_loop_modes(self) -> NDArray[np.complex128]:
+        """Eigenvalues of A + B `linear_gain`, the linearised game's closed loop [1/s], (n,)."""
+        A, B = self.linearization
+        return np.asarray(np.linalg.eigvals(A + B @ self.linear_gain), dtype=np.complex128)
+
+    @property
     def decay_rate(self) -> float:
         """Rate of the slowest mode of the linearised game's closed loop [1/s], positive."""
-        A, B = self.linearization
-        return -float(np.linalg.eigvals(A - B @ self.game.R_eff_inverse @ B.T @ self.P).real.max())
+        return -float(self.closed_loop_modes.real.max())
 
     @cached_property
     def gamma_star(self) -> float:
@@ -162,10 +174,10 @@ class Problem:
             [self.drift + self.input_matrix @ inverse.v - wanted],
         )
         rng = np.random.default_rng(0)
-        points = [
-            residual(rng.uniform(-0.5, 0.5, n) * self.scale, rng.uniform(-1, 1, k)) for _ in "abc"
-        ]
-        worst = max(float(np.abs(np.array(DM(point))).max()) for point in points)
+        worst = 0.0
+        for _ in range(3):
+            at = residual(rng.uniform(-0.5, 0.5, n) * self.scale, rng.uniform(-1, 1, k))
+            worst = max(worst, float(np.abs(np.array(DM(at))).max()))
         if not worst < 1e-9:
             raise InputError(
                 f"{self.name}: the inverse dynamics contradict f and g by {worst:.2g}; correct them"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stationkeep.offline.gauss import GaussRule, interpolate
+from stationkeep.offline.gauss import GaussRule
+from stationkeep.offline.interpolation import interpolate
 
 DEGREES = range(1, 10)
 

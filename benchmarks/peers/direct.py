@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from stationkeep.offline import DirectSolver
+from stationkeep.offline.settings import Method
 from stationkeep.symbolic import Problem
 from stationkeep.symbolic.vehicle import Array
 
@@ -11,31 +12,28 @@ from .game import Mesh, Solve
 
 def newton(problem: Problem, mesh: Mesh) -> Solve:
     """Return the solve of `DirectSolver` by its structured Newton method; IPOPT's help is an error."""
-    solver = DirectSolver(
-        problem,
-        horizon=mesh.horizon,
-        n_intervals=mesh.n_intervals,
-        degree=mesh.degree,
-        grading=mesh.grading,
-    )
-
-    def solve(zeta0: Array) -> float:
-        solution = solver.solve(zeta0, verify=False)
-        if solution.method != "newton":
-            raise RuntimeError("Newton's method did not converge")
-        return float(solution.value)
-
-    return solve
+    return _solve(problem, mesh, "newton")
 
 
 def ipopt(problem: Problem, mesh: Mesh) -> Solve:
     """Return the solve of `DirectSolver` through IPOPT."""
+    return _solve(problem, mesh, "ipopt")
+
+
+def _solve(problem: Problem, mesh: Mesh, method: Method) -> Solve:
     solver = DirectSolver(
         problem,
         horizon=mesh.horizon,
         n_intervals=mesh.n_intervals,
         degree=mesh.degree,
         grading=mesh.grading,
-        method="ipopt",
+        method=method,
     )
-    return lambda zeta0: solver.solve(zeta0, verify=False).value
+
+    def solve(zeta0: Array) -> float:
+        solution = solver.solve(zeta0, verify=False)
+        if solution.method != method:
+            raise RuntimeError(f"{method} did not converge")
+        return float(solution.value)
+
+    return solve

@@ -145,7 +145,8 @@ def backward(
     Parameters
     ----------
     hessian, gradient : (K, (2 + d) k, (2 + d) k) and (K, (2 + d) k) of the stages
-    inertia : (K, d k, d k), positive definite, what a negative curvature is measured against
+    inertia : (k, k) of the accelerations at a point, positive definite, what a negative curvature is
+        measured against
     """
     n = 2 * grid.k
     gains: Gains = []
@@ -156,7 +157,7 @@ def backward(
         g = gradient[i] + F.T @ p
         factor, failed = lapack.dpotrf(H[n:, n:], lower=1)
         if failed:
-            _, vectors = scipy.linalg.eigh(H[n:, n:], inertia[i])
+            _, vectors = scipy.linalg.eigh(H[n:, n:], np.kron(np.diag(grid.weights[i]), inertia))
             return Bent(i, vectors[:, 0], gains[::-1])
         right = np.column_stack([H[n:, :n], g[n:]])
         half, _ = lapack.dtrtrs(factor, right, lower=1)
