@@ -22,6 +22,7 @@ from ..comparison.ideal import (
 from ..comparison.optima import Optima
 from ..offline import Pairs
 from ..online import save
+from ..symbolic import InputError
 from .output import print_table
 from .solving import solve
 
@@ -44,6 +45,10 @@ def numbers(options: argparse.Namespace, scenario: Scenario) -> Numbers | None:
     """Return what --ideal-weights and --held-out ask for, None for no fit; raises InputError."""
     n_states: int | None = options.ideal_weights
     if n_states is None:
+        if options.held_out is not None:
+            raise InputError(
+                f"--held-out {options.held_out} goes with --ideal-weights N, which is missing; add it"
+            )
         return None
     held_out = max(10, n_states // 4) if options.held_out is None else options.held_out
     require_numbers(scenario, n_states, held_out)

@@ -55,7 +55,7 @@ def draw_all(comparison: Comparison, folder: Path) -> dict[str, Path]:
         "forces_earth": draw_forces(at("forces_earth"), learned, optimal, station, body=False),
         "rates": draw_states(at("rates"), learned, optimal, rates=True),
         "weights": draw_weights(at("weights"), learned, station.riccati_weights),
-        "bellman": draw_bellman(at("bellman"), learned),
+        "bellman": draw_bellman(at("bellman"), learned, comparison.scenario.learner.error),
         "excitation": draw_excitation(at("excitation"), comparison.excitation),
     }
     thrusters = station.model.vehicle.thrusters
@@ -161,13 +161,22 @@ def draw_weights(path: Path, learned: xr.Dataset, riccati: Array, *, shown: int 
     return path
 
 
-def draw_bellman(path: Path, learned: xr.Dataset) -> Path:
-    """Draw the Bellman error at the samples and at the state, and the rank margin of (18)."""
+ERRORS = {
+    "bellman": "rms of δ / ζ'Qζ over the samples [-]",
+    "costate": "root of the relative regret [-]",
+}
+
+
+def draw_bellman(path: Path, learned: xr.Dataset, error: str) -> Path:
+    """Draw the error that is learned from and δ at the state, and the rank margin of (18).
+
+    `error`: `learner.error` of the run, which says what the first of them is.
+    """
     time = learned["learn_time"].values
     with figure(path, "Bellman error and rank margin", 1, 3, 3.4) as panels:
         samples, state, margin = panels
         samples.plot(time, learned["sample_error"], color=LEARNED)
-        samples.set_title("rms of δ / ζ'Qζ over the samples [-]")
+        samples.set_title(ERRORS[error])
         samples.set_ylim(bottom=0.0)
         state.plot(time, np.abs(learned["bellman_error"]), color=LEARNED)
         state.set_yscale("log")

@@ -289,6 +289,7 @@ def test_the_command(tmp_path: Path, capsys: Capture, monkeypatch: pytest.Monkey
 @pytest.mark.parametrize(
     ("words", "told"),
     [
+        (("--held-out", "5"), ["--held-out 5", "--ideal-weights N"]),
         (("--ideal-weights", "0"), ["--ideal-weights is 0", "at least 12"]),
         (("--ideal-weights=-5",), ["--ideal-weights is -5"]),
         (("--ideal-weights", "11"), ["78 weights", "'quadratic'", "at least 12"]),
