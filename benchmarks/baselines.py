@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
+from stationkeep.comparison.contenders import CONTENDERS
 from stationkeep.comparison.metrics import (
     GameValue,
     RunMetrics,
@@ -33,10 +34,8 @@ from stationkeep.comparison.metrics import (
     run_metrics,
 )
 from stationkeep.comparison.mpc import ModelPredictive, PredictionSettings
-from stationkeep.comparison.pid import CascadedPID
-from stationkeep.comparison.policies import LQR, LinearPolicy
 from stationkeep.comparison.runs import online_record
-from stationkeep.online import Controller, Policy, draw_samples
+from stationkeep.online import Policy, draw_samples
 from stationkeep.online.record import write_text
 
 Make = Callable[[Scenario], Policy]
@@ -54,12 +53,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
 
 def policies(horizons: tuple[float, ...]) -> dict[str, Make]:
     """Return what makes each policy."""
-    makers: dict[str, Make] = {
-        "learned": Controller,
-        "linear H-inf": lambda scenario: LinearPolicy(scenario.station_keeping()),
-        "LQR": lambda scenario: LQR(scenario.station_keeping()),
-        "PID": lambda scenario: CascadedPID(scenario.station_keeping()),
-    }
+    names = ("learned", "linear", "lqr", "pid")
+    makers: dict[str, Make] = {CONTENDERS[name].label: CONTENDERS[name].make for name in names}
     for horizon in horizons:
         makers[f"MPC {horizon:g} s"] = partial(predictive, horizon=horizon)
     return makers
@@ -91,7 +86,7 @@ def undisturbed(scenario: Scenario, n_states: int) -> list[dict[str, Any]]:
     value = GameValue(station)
     optima = [value(state) for state in states]
     header = (
-        f"{'policy':<14}{'regret [%]: median':>19}{'90 %':>7}{'max':>7}{'failed':>8}{'rms [m]':>9}"
+        f"{'policy':<24}{'regret [%]: median':>19}{'90 %':>7}{'max':>7}{'failed':>8}{'rms [m]':>9}"
         f"{'max [m]':>9}{'effort':>9}{'energy [J]':>12}{'us/step: median':>17}{'mean':>7}"
         f"{'lost solves':>13}"
     )
@@ -113,7 +108,7 @@ def undisturbed(scenario: Scenario, n_states: int) -> list[dict[str, Any]]:
         rows.append(row)
         shares = "".join(f"{100.0 * regret[key]:>{w}.3f}" for key, w in (("p90", 7), ("max", 7)))
         print(
-            f"{name:<14}{100.0 * regret['median']:>19.3f}{shares}{regret['diverged']:>8}"
+            f"{name:<24}{100.0 * regret['median']:>19.3f}{shares}{regret['diverged']:>8}"
             f"{row['position_rms']:>9.3f}{row['excursion']:>9.3f}{row['effort']:>9.1f}"
             f"{row['energy']:>12.1f}{row['policy_microseconds']:>17.0f}{row['policy_mean']:>7.0f}"
             f"{f'{lost}/{solves}' if solves else '':>13}",
@@ -136,7 +131,7 @@ def median(found: list[RunMetrics], name: str) -> float:
 def disturbed(scenario: Scenario, duration: float) -> list[dict[str, Any]]:
     """Print and return the second table."""
     print(
-        f"\nfrom rest, {duration:g} s disturbed\n{'disturbance':<18}{'with':<11}{'policy':<14}"
+        f"\nfrom rest, {duration:g} s disturbed\n{'disturbance':<18}{'with':<11}{'policy':<24}"
         f"{'rms [m]':>8}{'max [m]':>9}{'energy [J]':>12}{'saturated [%]':>15}{'margin':>11}"
         f"{'/supplied [%]':>15}  ended early"
     )
@@ -173,7 +168,7 @@ def print_disturbed(row: dict[str, Any]) -> None:
     """Print a row of the second table."""
     saturated = "" if row["saturated"] is None else f"{100.0 * row['saturated']:.1f}"
     print(
-        f"{row['disturbance']:<18}{row['with']:<11}{row['policy']:<14}{row['position_rms']:>8.3f}"
+        f"{row['disturbance']:<18}{row['with']:<11}{row['policy']:<24}{row['position_rms']:>8.3f}"
         f"{row['excursion']:>9.3f}{row['energy']:>12.1f}{saturated:>15}{row['margin']:>11.2f}"
         f"{100.0 * row['margin'] / row['supplied']:>15.1f}  {row['stopped'] or ''}",
         flush=True,

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.compare import CASES
+from stationkeep.comparison.contenders import CONTENDERS
 from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.offline import DirectSolver
 from stationkeep.online import Controller, History, draw_samples, run, save, to_dataset
@@ -89,7 +89,7 @@ def table(scale: float, options: argparse.Namespace, folder: Path) -> None:
         "frozen": frozen(scenario, folder),
     }
     if not options.no_gradient:
-        runs["gradient as printed"] = lambda one: run(one.with_settings(**CASES["gradient law"]))
+        runs["gradient as printed"] = lambda one: run(CONTENDERS["gradient"].changed(one))
     linear = np.full(3, np.nan)
     for name, go in runs.items():
         regret = np.empty(len(states))

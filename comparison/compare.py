@@ -14,33 +14,17 @@ from ..online import draw_samples
 from ..symbolic import StationKeeping
 from ..symbolic.vehicle import Array
 from .conditions import Condition, check
+from .contenders import CONTENDERS
 from .excitation import ExcitationRun, excitation_runs
 from .metrics import RunMetrics, distribution, run_metrics
-from .policies import LinearPolicy
-from .runs import online_record, optimal_record
+from .runs import contender_record, optimal_record
 from .scenario import Scenario
 
 Stage = Callable[[str, float], None]
 
-# Benchmark cases beside the scenario's own learner: what the paper's plain choices make of it.
-CASES: dict[str, dict[str, dict[str, Any]]] = {
-    "quadratic basis": {"basis": {"name": "quadratic"}, "learner": {"weights": "riccati"}},
-    "gradient law": {
-        "learner": {
-            "rule": "gradient",
-            "error": "bellman",
-            "safeguard": False,
-            "normalizer": "paper",
-            "leash": 0.0,
-            "gain_samples": None,
-            "average_samples": False,
-            "gain_actor_1": 2.0,
-            "gain_actor_2": 2.0,
-        },
-        "samples": {"strategy": "fixed"},
-    },
-}
-LABELS = {"learned": "learned (this scenario)", "linear": "linear H-infinity"}
+# the cases that are run from the scenario's own state
+POLICIES = ("learned", "linear", "quadratic", "gradient")
+JUDGED = ("learned", "linear")  # from every state; one that ends early is a fault
 
 
 @dataclass(frozen=True)
@@ -81,9 +65,9 @@ class Comparison:
     def faults(self) -> list[str]:
         """What did not converge: runs that ended early and certificates that failed."""
         ended = [
-            f"{LABELS.get(name, name)}: {metrics.stopped}"
+            f"{CONTENDERS[name].label}: {metrics.stopped}"
             for name, metrics in self.metrics.items()
-            if metrics.stopped and name in LABELS
+            if metrics.stopped and name in JUDGED
         ]
         failed = str(self.optimal.attrs["faults"])
         return ended + ([f"offline optimum: {failed}"] if failed else [])
@@ -138,27 +122,15 @@ def compare(
 
 
 def _closed_loops(scenario: Scenario, folder: Path, tell: Stage) -> dict[str, xr.Dataset]:
-    station = scenario.station_keeping()
     duration = scenario.simulation.duration
 
     def progress(name: str) -> Callable[[float], None]:
-        return lambda t: tell(name, t / duration)
+        return lambda t: tell(f"{CONTENDERS[name].label}, run", t / duration)
 
-    records = {
-        "learned": online_record(scenario, folder / "learned.nc", progress=progress("learned run")),
-        "linear": online_record(
-            scenario,
-            folder / "linear.nc",
-            policy=lambda: LinearPolicy(station),
-            kind="linear",
-            progress=progress("linear run"),
-        ),
+    return {
+        name: contender_record(scenario, name, folder / f"{name}.nc", progress(name))
+        for name in POLICIES
     }
-    for name, groups in CASES.items():
-        case = scenario.with_settings(**groups)
-        path = folder / f"{name.replace(' ', '-')}.nc"
-        records[name] = online_record(case, path, kind=name, progress=progress(f"{name} run"))
-    return records
 
 
 def _another_state(
@@ -175,8 +147,8 @@ def _another_state(
     name = f"state-{index + 2}"
     optimal = optimal_record(there, solver, folder / f"{name}-optimal.nc", zeta0)
     value = float(optimal.attrs["value"])
-    for kind, policy in (("learned", None), ("linear", lambda: LinearPolicy(station))):
-        record = online_record(there, folder / f"{name}-{kind}.nc", policy=policy, kind=kind)
+    for kind in JUDGED:
+        record = contender_record(there, kind, folder / f"{name}-{kind}.nc")
         regrets[kind].append(run_metrics(record, station, value).regret)
     return float(optimal.attrs["value_error"])
 

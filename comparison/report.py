@@ -8,7 +8,8 @@ from html import escape
 from pathlib import Path
 
 from ..online.record import write_text
-from .compare import LABELS, Comparison
+from .compare import Comparison
+from .contenders import CONTENDERS
 
 _STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #1b1b1b; max-width: 60rem; margin: 2rem auto;
@@ -103,7 +104,7 @@ def summary(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
     for name, metrics in comparison.metrics.items():
         rows.append(
             [
-                LABELS.get(name, name),
+                CONTENDERS[name].label,
                 _number(metrics.cost, ".4f"),
                 _number(metrics.regret, ".3f", 100.0),
                 _number(metrics.position_rms, ".3f"),

@@ -19,6 +19,7 @@ from ..online.closed_loop import STATE_NAMES, Progress
 from ..online.record import versions
 from ..symbolic import InputError, RunError
 from ..symbolic.vehicle import Array
+from .contenders import contender
 from .scenario import Scenario
 
 FORMAT = 3  # of the records; raise it when what is in them, or how a run is made, changes
@@ -80,6 +81,15 @@ def online_record(
     if str(record.attrs["stopped"]).startswith("interrupted"):
         raise KeyboardInterrupt  # the part that was run is kept
     return record
+
+
+def contender_record(
+    scenario: Scenario, name: str, path: Path | None = None, progress: Progress | None = None
+) -> xr.Dataset:
+    """Return the record of a contender's run, from `path` if it holds this very run."""
+    one = contender(name)
+    changed = one.changed(scenario)
+    return online_record(changed, path, policy=lambda: one.make(changed), kind=name, progress=progress)
 
 
 def optimal_record(

@@ -19,7 +19,7 @@ FIGURES = {
     *("states", "rates", "cost", "forces_body", "forces_earth", "thrusters", "weights"),
     *("bellman", "excitation"),
 }
-RECORDS = {"learned", "linear", "optimal", "quadratic-basis", "gradient-law"}
+RECORDS = {"learned", "linear", "optimal", "quadratic", "gradient"}
 
 
 class Page(HTMLParser):
