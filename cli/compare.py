@@ -7,27 +7,36 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from ..comparison.compare import Comparison, compare
+from ..comparison.analysis import Field
+from ..comparison.compare import Comparison, Plan, compare
 from ..comparison.figures import draw_all
-from ..comparison.report import certificate, summary, too_short, verdict, write_report
+from ..comparison.pool import default_workers
+from ..comparison.report import write_report
+from ..comparison.report_tables import certificate, summary, too_short, verdict
+from ..comparison.style import Page
 from ..symbolic import InputError
 from .output import load_scenario, output_folder, print_json, print_table, progress
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run learner, baselines and optimum; write figures and report; print the summary."""
+    """Run every policy and the optimum; write figures and report; print the summary."""
     if options.n_states < 1:
         raise InputError(f"--n-states is {options.n_states}, but must be at least 1")
-    scenario = load_scenario(options)
+    if options.workers is not None and options.workers < 1:
+        raise InputError(f"--workers is {options.workers}, but must be at least 1")
+    plan = Plan(load_scenario(options), options.n_states, Field.of(options.field))
     folder = output_folder(options)
+    n_workers = options.workers or default_workers()
+    pages = (Page(folder / "figures"), Page(None))
     with progress(options) as tell:
-        comparison = compare(scenario, folder / "records", n_states=options.n_states, stage=tell)
-        tell("figures", 0.0)
-        figures = draw_all(comparison, folder / "figures")
+        comparison = compare(plan, folder / "records", n_workers=n_workers, tell=tell)
+        for i, page in enumerate(pages):
+            tell("figures", i / len(pages))
+            draw_all(comparison, page)
         tell("report", 0.0)
-        report = write_report(folder / "report.html", comparison, figures, _commands(options))
+        report = write_report(folder / "report.html", comparison, *pages, _commands(options))
     if options.json:
-        print_json(_answer(comparison, figures, report))
+        print_json(_answer(comparison, pages[0].files, report))
     else:
         _print(comparison, report)
     return 1 if comparison.faults else 0
@@ -45,6 +54,8 @@ def _answer(comparison: Comparison, figures: dict[str, Path], report: Path) -> d
         "report": report,
         "faults": comparison.faults,
     }
+    if comparison.margins:
+        answer["dissipation_margin"] = comparison.margins
     notes = {}
     if comparison.regret is None:
         notes["regret"] = verdict(comparison)
@@ -56,7 +67,7 @@ def _answer(comparison: Comparison, figures: dict[str, Path], report: Path) -> d
 def _commands(options: argparse.Namespace) -> list[str]:
     """Return the commands that give the same numbers again."""
     settings = [word for override in options.overrides for word in ("--set", override)]
-    count = ["--n-states", str(options.n_states)] if options.n_states > 1 else []
+    count = ["--n-states", str(options.n_states)]
     return [
         shlex.join(["stationkeep", command, options.scenario, *settings, *extra])
         for command, extra in (("compare", count), ("online", []), ("offline", []), ("check", []))

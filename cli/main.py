@@ -126,14 +126,34 @@ def parser() -> argparse.ArgumentParser:
                 help="ideal-weights.nc of 'offline --ideal-weights', for what needs ε and ε'",
             )
         if name == "compare":
-            command.add_argument(
-                "--n-states",
-                type=int,
-                default=1,
-                metavar="N",
-                help="compare from N states: the scenario's and N - 1 random ones of the envelope",
-            )
+            _compare_options(command)
     return top
+
+
+def _compare_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--n-states",
+        type=int,
+        default=10,
+        metavar="N",
+        help="compare from N states: the scenario's, and N - 1 of the envelope (default: 10)",
+    )
+    command.add_argument(
+        "--field",
+        default="x,y",
+        metavar="STATE,STATE",
+        help="draw the Bellman error over these two states (default: x,y)",
+    )
+    _workers_option(command)
+
+
+def _workers_option(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes that work at the same time (default: as many as there are cores)",
+    )
 
 
 def _offline_options(command: argparse.ArgumentParser) -> None:
@@ -152,12 +172,7 @@ def _offline_options(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="also the best responses of both players, and the linear policy's worst case",
     )
-    command.add_argument(
-        "--workers",
-        type=int,
-        metavar="N",
-        help="processes that solve at the same time (default: as many as there are cores)",
-    )
+    _workers_option(command)
     command.add_argument(
         "--ideal-weights",
         type=int,

@@ -1,30 +1,69 @@
-"""Learned beside optimal, from one scenario: runs, regret, figures and report."""
+"""Policies beside the optimum, from one scenario: runs, figures of merit, regret."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from ..offline import OfflineSolver
-from ..online import draw_samples
-from ..symbolic import StationKeeping
-from ..symbolic.vehicle import Array
+from ..online import draw_samples, load
+from ..symbolic import RunError, StationKeeping
+from .analysis import Field, analysis_record
 from .conditions import Condition, check
 from .contenders import CONTENDERS
 from .excitation import ExcitationRun, excitation_runs
-from .metrics import RunMetrics, distribution, run_metrics
+from .metrics import GameValue, RunMetrics, dissipation_margin, distribution, run_metrics
+from .pool import Work, run_tasks
 from .runs import contender_record, optimal_record
 from .scenario import Scenario
 
-Stage = Callable[[str, float], None]
+Tell = Callable[[str, float], None]
 
-# the cases that are run from the scenario's own state
-POLICIES = ("learned", "linear", "quadratic", "gradient")
-JUDGED = ("learned", "linear")  # from every state; one that ends early is a fault
+EVERYWHERE = ("learned", "linear", "lqr", "pid", "mpc")  # run from every state
+POLICIES = (*EVERYWHERE, "quadratic", "gradient")  # from the scenario's own
+JUDGED = ("learned", "linear")  # a run of theirs that ends early is a fault
+OPTIMUM = "optimal"
+X_Y = Field(0, 1)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be compared.
+
+    Attributes
+    ----------
+    scenario : of all runs
+    n_states : the scenario's initial state, and seeded ones of its envelope
+    field : states over which the Bellman error is drawn
+    """
+
+    scenario: Scenario
+    n_states: int = 1
+    field: Field = X_Y
+
+    def scenarios(self) -> list[Scenario]:
+        """Return the scenario from each of the states."""
+        envelope = self.scenario.station_keeping().envelope
+        states = draw_samples(envelope, self.n_states - 1, self.scenario.simulation.seed)
+        others = [
+            self.scenario.with_settings(simulation={"initial_state": tuple(state.tolist())})
+            for state in states
+        ]
+        return [self.scenario, *others]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """What a comparison keeps of the optimum from one state; a `fault` where there is none."""
+
+    value: float | None
+    value_error: float
+    fault: str = ""
 
 
 @dataclass(frozen=True)
@@ -34,13 +73,12 @@ class Comparison:
     Attributes
     ----------
     scenario, station : what was compared
-    records : closed-loop records from the scenario's initial state, `learned` and `linear` first
-    optimal : record of the offline optimum
-    metrics : of each record
-    regret : for each policy median, p90, max over the states and the number that diverged; None in
-        `disturbed` mode, where the game's optimum is no reference
-    n_states : states compared: the scenario's, and seeded ones of the envelope
-    value_error : largest relative value error of the optima
+    records : closed-loop records from the scenario's initial state
+    optimal : record of the offline optimum from there
+    all_metrics : of each policy from each state that it was run from, the scenario's first
+    optima : from each state
+    margins : of each record from the scenario's state, in `disturbed` mode: the dissipation margin
+    analysis : errors along and around the learned run, ideal weights; see `analysis_record`
     excitation : runs without and with samples
     conditions : the paper's assumptions and conditions
     """
@@ -49,12 +87,49 @@ class Comparison:
     station: StationKeeping
     records: dict[str, xr.Dataset]
     optimal: xr.Dataset
-    metrics: dict[str, RunMetrics]
-    regret: dict[str, dict[str, Any]] | None
-    n_states: int
-    value_error: float
+    all_metrics: dict[str, list[RunMetrics]]
+    optima: list[Optimum]
+    margins: dict[str, float]
+    analysis: xr.Dataset
     excitation: dict[str, list[ExcitationRun]]
     conditions: list[Condition]
+
+    @property
+    def metrics(self) -> dict[str, RunMetrics]:
+        """Of each policy from the scenario's own state."""
+        return {name: runs[0] for name, runs in self.all_metrics.items()}
+
+    @property
+    def n_states(self) -> int:
+        """Number of initial states."""
+        return len(self.optima)
+
+    @property
+    def value_error(self) -> float:
+        """Largest relative value error of the optima."""
+        return max(optimum.value_error for optimum in self.optima)
+
+    @property
+    def regrets(self) -> dict[str, list[float | None]]:
+        """Of each policy from each state that has an optimum; None where a run ended early."""
+        return {
+            name: [
+                run.regret
+                for run, optimum in zip(runs, self.optima, strict=False)
+                if optimum.value is not None
+            ]
+            for name, runs in self.all_metrics.items()
+        }
+
+    @property
+    def regret(self) -> dict[str, dict[str, Any]] | None:
+        """For each policy median, p90, max and the number that diverged.
+
+        None in `disturbed` mode, where the game's optimum is no reference.
+        """
+        if self.scenario.simulation.mode != "game":
+            return None
+        return {name: distribution(regrets) for name, regrets in self.regrets.items()}
 
     @property
     def too_short(self) -> list[str]:
@@ -64,93 +139,139 @@ class Comparison:
     @property
     def faults(self) -> list[str]:
         """What did not converge: runs that ended early and certificates that failed."""
-        ended = [
-            f"{CONTENDERS[name].label}: {metrics.stopped}"
-            for name, metrics in self.metrics.items()
-            if metrics.stopped and name in JUDGED
-        ]
-        failed = str(self.optimal.attrs["faults"])
-        return ended + ([f"offline optimum: {failed}"] if failed else [])
+        found = []
+        for number, optimum in enumerate(self.optima, 1):
+            where = "" if number == 1 else f"state {number}, "
+            if optimum.fault:
+                found.append(f"{where}offline optimum: {optimum.fault}")
+            for name in JUDGED:
+                stopped = self.all_metrics[name][number - 1].stopped
+                if stopped:
+                    found.append(f"{where}{CONTENDERS[name].label}: {stopped}")
+        return found
 
 
-def compare(
-    scenario: Scenario, folder: Path, *, n_states: int = 1, stage: Stage | None = None
-) -> Comparison:
-    """Run (or reuse from `folder`) the learner, the baselines and the optimum from the same state.
+def compare(plan: Plan, folder: Path, *, n_workers: int = 1, tell: Tell | None = None) -> Comparison:
+    """Run (or reuse from `folder`) every policy and the optimum from the same states.
 
     Parameters
     ----------
     folder : where records are kept; those that still fit the scenario are reused
-    n_states : more than 1 adds seeded states of the envelope, each with its own runs and optimum
-    stage : called with the name of the present stage and the part of it that is done
+    n_workers : processes that run at the same time
+    tell : called with the name of the present stage and the part of it that is done
 
     Raises
     ------
     RunError
-        If the offline solver does not converge.
+        If the offline solver does not converge from the scenario's own state, or a worker was lost.
     """
-    tell = stage if stage is not None else _silent
-    station = scenario.station_keeping()
-    records = _closed_loops(scenario, folder, tell)
-    tell("offline optimum", 0.0)
-    solver = OfflineSolver(station.problem, scenario.offline)
-    optimal = optimal_record(scenario, solver, folder / "optimal.nc")
-    game_mode = scenario.simulation.mode == "game"
-    optimum = float(optimal.attrs["value"]) if game_mode else None
-    metrics = {name: run_metrics(record, station, optimum) for name, record in records.items()}
-    regrets = {name: [metric.regret] for name, metric in metrics.items()}
-    errors = [float(optimal.attrs["value_error"])]
-    if game_mode:
-        states = draw_samples(station.envelope, n_states - 1, scenario.simulation.seed)
-        for i, zeta0 in enumerate(states):
-            tell(f"envelope states, {i + 1} of {n_states - 1}", 0.0)
-            errors.append(_another_state(scenario, solver, folder, i, zeta0, regrets))
-    tell("runs without and with samples", 0.0)
-    excitation = excitation_runs(scenario)
+    told = tell if tell is not None else _silent
+    scenario, station = plan.scenario, plan.scenario.station_keeping()
+    scenarios = plan.scenarios()
+    found, optima = _made(scenarios, folder, n_workers, told)
+    if optima[0].value is None:
+        raise RunError(optima[0].fault)
+    if scenario.simulation.mode == "game":
+        for runs in found.values():
+            runs[:] = [_regretted(run, optima[i].value) for i, run in enumerate(runs)]
+    records = {name: load(_path(folder, 0, name)) for name in POLICIES}
+    told("errors along the way", 0.0)
+    analysis = analysis_record(scenario, records["learned"], plan.field, folder / "analysis.nc")
+    told("runs without and with samples", 0.0)
     return Comparison(
         scenario=scenario,
         station=station,
         records=records,
-        optimal=optimal,
-        metrics=metrics,
-        regret={n: distribution(values) for n, values in regrets.items()} if game_mode else None,
-        n_states=n_states if game_mode else 1,
-        value_error=max(errors),
-        excitation=excitation,
+        optimal=load(_path(folder, 0, OPTIMUM)),
+        all_metrics=found,
+        optima=optima,
+        margins=_margins(station, records) if scenario.simulation.mode == "disturbed" else {},
+        analysis=analysis,
+        excitation=excitation_runs(scenario),
         conditions=check(scenario),
     )
 
 
-def _closed_loops(scenario: Scenario, folder: Path, tell: Stage) -> dict[str, xr.Dataset]:
-    duration = scenario.simulation.duration
+@dataclass(frozen=True)
+class _Task:
+    """A policy, or the optimum, from one of the states."""
 
-    def progress(name: str) -> Callable[[float], None]:
-        return lambda t: tell(f"{CONTENDERS[name].label}, run", t / duration)
+    state: int
+    what: str
 
+
+def _made(
+    scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
+) -> tuple[dict[str, list[RunMetrics]], list[Optimum]]:
+    """Make all records; return the figures of merit and the optima, in the order of the states."""
+    tasks = [
+        _Task(state, what)
+        for state in range(len(scenarios))
+        for what in (OPTIMUM, *(EVERYWHERE if state else POLICIES))
+    ]
+    answers: dict[_Task, RunMetrics | Optimum] = {}
+    tell("runs", 0.0)
+    with closing(run_tasks(_worker, (scenarios, folder), tasks, n_workers)) as events:
+        for event in events:
+            if event.message is None:
+                raise RunError(str(event.failure))
+            answers[tasks[event.task]] = event.message
+            tell("runs", len(answers) / len(tasks))
+    metrics: dict[str, list[RunMetrics]] = {name: [] for name in POLICIES}
+    optima = []
+    for task in tasks:
+        answer = answers[task]
+        if isinstance(answer, Optimum):
+            optima.append(answer)
+        else:
+            metrics[task.what].append(answer)
+    return metrics, optima
+
+
+def _worker(shipment: tuple[list[Scenario], Path]) -> Work[_Task, RunMetrics | Optimum]:
+    """Return what makes one record and tells its figures of merit."""
+    scenarios, folder = shipment
+    station = scenarios[0].station_keeping()
+    solver = OfflineSolver(station.problem, scenarios[0].offline)
+
+    def work(task: _Task) -> Iterator[RunMetrics | Optimum]:
+        scenario, path = scenarios[task.state], _path(folder, task.state, task.what)
+        if task.what == OPTIMUM:
+            yield _optimum(scenario, solver, path)
+        else:
+            yield run_metrics(contender_record(scenario, task.what, path), station, None)
+
+    return work
+
+
+def _optimum(scenario: Scenario, solver: OfflineSolver, path: Path) -> Optimum:
+    try:
+        attributes = optimal_record(scenario, solver, path).attrs
+    except RunError as error:
+        return Optimum(None, 0.0, str(error))
+    value, accuracy = float(attributes["value"]), float(attributes["value_error"])
+    return Optimum(value, accuracy, str(attributes["faults"]))
+
+
+def _path(folder: Path, state: int, what: str) -> Path:
+    return folder / (f"state-{state + 1}-{what}.nc" if state else f"{what}.nc")
+
+
+def _regretted(run: RunMetrics, optimum: float | None) -> RunMetrics:
+    if run.cost is None or optimum is None:
+        return run
+    return replace(run, regret=(run.cost - optimum) / optimum)
+
+
+def _margins(station: StationKeeping, records: dict[str, xr.Dataset]) -> dict[str, float]:
+    """Return the dissipation margin of the runs that did not end at once."""
+    value = GameValue(station)
+    ends = {name: record["zeta"].values[[0, -1]] for name, record in records.items()}
     return {
-        name: contender_record(scenario, name, folder / f"{name}.nc", progress(name))
-        for name in POLICIES
+        name: dissipation_margin(records[name], value(first), value(last))
+        for name, (first, last) in ends.items()
+        if len(records[name]["time"]) > 1
     }
-
-
-def _another_state(
-    scenario: Scenario,
-    solver: OfflineSolver,
-    folder: Path,
-    index: int,
-    zeta0: Array,
-    regrets: dict[str, list[float | None]],
-) -> float:
-    """Compare from one more state; append to `regrets` and return the optimum's value error."""
-    there = scenario.with_settings(simulation={"initial_state": tuple(zeta0.tolist())})
-    station = there.station_keeping()
-    name = f"state-{index + 2}"
-    optimal = optimal_record(there, solver, folder / f"{name}-optimal.nc", zeta0)
-    value = float(optimal.attrs["value"])
-    for kind in JUDGED:
-        record = contender_record(there, kind, folder / f"{name}-{kind}.nc")
-        regrets[kind].append(run_metrics(record, station, value).regret)
-    return float(optimal.attrs["value_error"])
 
 
 def _silent(name: str, part: float) -> None:

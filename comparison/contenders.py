@@ -56,7 +56,7 @@ class Contender:
 
 
 CONTENDERS: dict[str, Contender] = {
-    "learned": Contender("learned (this scenario)"),
+    "learned": Contender("learned"),
     "linear": Contender("linear H-infinity", lambda scenario: LinearPolicy(scenario.station_keeping())),
     "lqr": Contender("LQR", lambda scenario: LQR(scenario.station_keeping())),
     "pid": Contender("cascaded PID", lambda scenario: CascadedPID(scenario.station_keeping())),

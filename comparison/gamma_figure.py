@@ -10,15 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from ..offline import GammaCurve
-from .style import LINEAR, PALETTE, figure, legend_below
+from .style import LINEAR, PALETTE, Page, legend_below
 
 TICKS = (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0, 50.0, 100.0)  # of γ / γ*
 
 
 def draw_gamma_curves(path: Path, curves: Sequence[GammaCurve]) -> Path:
-    """Draw value and slope of every curve against γ; as many states as colours get a name each."""
+    """Draw value and slope of every curve against γ into a PNG file, and a PDF file beside it.
+
+    As many states as there are colours get a name each.
+    """
     named = 1 < len(curves) <= len(PALETTE)
-    with figure(path, "The value of the game against γ", 1, 2, 4.2) as (values, slopes):
+    page = Page(path.parent)
+    with page.figure(path.stem, "The value of the game against γ", 1, 2, 4.2) as (values, slopes):
         for i, curve in enumerate(curves):
             name = f"state {i + 1}" if named else "nonlinear game" if i == 0 else None
             _draw_curve(values, slopes, curve, PALETTE[i] if named else PALETTE[0], name)

@@ -149,4 +149,9 @@ class GameValue:
 
     def __call__(self, zeta: Array) -> float:
         """Return V*(ζ); raises RunError where the solver does not converge."""
-        return self._solver.solve(zeta, verify=False).value
+        return self.with_costate(zeta)[0]
+
+    def with_costate(self, zeta: Array) -> tuple[float, Array]:
+        """Return V*(ζ) and its gradient, (n,); raises RunError where the solver does not converge."""
+        solution = self._solver.solve(zeta, verify=False)
+        return solution.value, solution.costate

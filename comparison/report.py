@@ -9,157 +9,160 @@ from pathlib import Path
 
 from ..online.record import write_text
 from .compare import Comparison
-from .contenders import CONTENDERS
+from .report_tables import certificate, conditions, summary, too_short, verdict
+from .style import Page
 
 _STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #1b1b1b; max-width: 60rem; margin: 2rem auto;
+:root { color-scheme: light; }
+body { font: 16px/1.55 system-ui, sans-serif; color: #1b1b1b; max-width: 60rem; margin: 2rem auto;
        padding: 0 1rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-img { width: 100%; height: auto; border: 1px solid #ddd; margin: .4rem 0 1.2rem; }
+h1 { font-size: 1.6rem; line-height: 1.25; } h2 { font-size: 1.25rem; margin-top: 2.4rem; }
+h1, p, li, figcaption, summary { overflow-wrap: break-word; }
+figure { margin: 1.6rem 0; } figcaption { margin-bottom: .4rem; }
+img { width: 100%; height: auto; border: 1px solid #ddd; display: block; }
 table { border-collapse: collapse; width: 100%; font-size: .9rem; }
 .wide { overflow-x: auto; }
 th, td { text-align: left; padding: .3rem .7rem .3rem 0; border-bottom: 1px solid #ddd;
          vertical-align: top; }
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 pre { background: #f4f4f4; padding: .8rem; overflow-x: auto; font-size: .85rem; }
+summary { cursor: pointer; font-weight: 600; margin: .8rem 0; }
 .lead { font-size: 1.15rem; } .fault { color: #a31515; }
+@media (max-width: 640px) { body { margin: 1rem auto; } h1 { font-size: 1.35rem; } }
 """
 
 CAPTIONS = {
-    "states": "Pose on the way back to the station, under the learned and under the optimal policy.",
+    "regret": "Regret is how much more than the optimum a policy costs, from the same state. Each dot "
+    "is one initial state.",
+    "energy": "What it takes to hold the station, against how well it is held. Energy is that of "
+    "the thrusters where their power is known.",
+    "path": "The way back in space and from above.",
+    "states": "The pose on the way back, under the learned and under the optimal policy.",
     "rates": "The rates on the same way.",
-    "forces_body": "Body wrench that the thrusters are asked for, with what they can give on each axis "
+    "forces_body": "Wrench that the thrusters are asked for, with what they can give on each axis "
     "alone.",
-    "forces_earth": "Earth-frame control u₁. The cost weighs this, J⁻ᵀτ_b, and not the body effort.",
-    "thrusters": "Thrust of each thruster, least-norm allocation.",
-    "cost": "Cost to date, and how far it lies above the optimum's.",
-    "weights": "The critic's weights while it learns, from the Riccati solution on.",
-    "bellman": "The Bellman error (17) at the samples and at the state, and the rank margin of (18).",
-    "excitation": "The paper's claim: with sample points the weights converge although the trajectory "
-    "excites only a few directions; without, they stay where they were or the run is lost. The right "
-    "weights are known exactly for the linearised vehicle.",
+    "forces_earth": "Control in the earth frame. The cost weighs this, J⁻ᵀτ_b, not the body effort.",
+    "thrusters": "Thrust of each thruster, with the least sum of squares.",
+    "cost": "Cost so far, and how far it lies above.",
+    "errors": "At each moment the optimum is solved again from the state that the vehicle is in: how "
+    "far off the learned value and control are there, and how far the linear ones.",
+    "weights": "The weights of the value while it is learned. W* fits the optimum best over the "
+    "whole envelope; the learner fits the way that the vehicle is on, so it need not end there.",
+    "bellman": "The error that is learned from, the Bellman error at the state, and what the paper's "
+    "rank condition asks to be positive.",
+    "field": "How well the equation of the optimum (HJI) is met around the vehicle (dot), over two of "
+    "its twelve states; the line is its way.",
+    "excitation": "The paper's claim: with sample points the weights converge although the way excites "
+    "only a few directions; without, they stay where they were or the run is lost. The right weights "
+    "are known exactly for the linearised vehicle.",
+}
+_COLUMNS = (
+    "From the state above; median and worst are those of the regret from all states. rms: distance "
+    "from the station. Energy: electrical, of the thrusters. Peak thrust: largest share of a "
+    "thruster's limit. Step: mean computing time of one control step, learning or predicting included."
+)
+WORDS = {
+    "optimum": "the least cost that the game allows, computed offline for the exact model, with a "
+    "certificate of its error",
+    "learned": "the policy that learns while the vehicle moves, from the linear one on",
+    "linear H-infinity": "the policy of the linearised game (its Riccati equation); learns nothing",
+    "regret": "cost of a policy minus V*, divided by V*",
+    "V*": "the cost of the optimum",
+    "γ": "how dear the disturbance's effort is; a small γ prepares for a strong disturbance",
 }
 
 
 def write_report(
-    path: Path, comparison: Comparison, figures: dict[str, Path], commands: Sequence[str]
+    path: Path, comparison: Comparison, wide: Page, phone: Page, commands: Sequence[str]
 ) -> Path:
-    """Write the report, figures embedded; raises InputError if the folder can't be written."""
+    """Write the report, figures embedded; raises InputError if the folder can't be written.
+
+    Parameters
+    ----------
+    wide, phone : the same figures for a page and for a phone
+    """
     name = comparison.station.model.vehicle.name
     body = [
         f"<h1>Station keeping of {escape(name)}: learned beside optimal</h1>",
         f'<p class="lead">{escape(verdict(comparison))}</p>',
         *[f'<p class="fault">{escape(too_short(comparison))}</p>' for _ in comparison.too_short[:1]],
         *[f'<p class="fault">{escape(fault)}</p>' for fault in comparison.faults],
+        "<h2>What was asked</h2>",
         _asked(comparison),
+        _folded("The words used here", _words()),
         "<h2>What came out</h2>",
         _table(*summary(comparison)),
-        *[_figure(key, figure) for key, figure in figures.items()],
+        f"<p>{_COLUMNS}</p>",
+        *[_figure(key, wide.pictures[key], phone.pictures[key]) for key in wide.pictures],
         "<h2>How sure it is</h2>",
+        "<p>The optimum is judged by other means than the solver that found it: a finer mesh, the "
+        "equations integrated again, the HJI at the initial state, finite differences, a longer "
+        "horizon and a second method that shares no equations with the first.</p>",
         _table(*certificate(comparison)),
         "<h2>The paper's conditions</h2>",
+        "<p>They are sufficient, not necessary: a run may be good though one fails.</p>",
         _table(*conditions(comparison)),
         "<h2>Do it again</h2>",
         f"<pre>{escape(chr(10).join(commands))}</pre>",
-        f"<pre>{escape(comparison.scenario.model_dump_json(indent=1))}</pre>",
+        "<p>The records beside this report hold every number drawn here, with scenario, seed, versions "
+        "and the hash of the compiled functions.</p>",
+        _folded("The scenario", f"<pre>{escape(comparison.scenario.model_dump_json(indent=1))}</pre>"),
     ]
     page = (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        '<link rel="icon" href="data:,">'
         f"<title>{escape(name)}: learned beside optimal</title><style>{_STYLE}</style></head>"
         f"<body>{''.join(body)}</body></html>"
     )
     return write_text(path, page)
 
 
-def verdict(comparison: Comparison) -> str:
-    """Return the outcome in one sentence."""
-    if comparison.regret is None:
-        return "With a real disturbance the game's optimum is no reference: there is no regret."
-    learned, linear = (comparison.regret[name]["median"] for name in ("learned", "linear"))
-    if learned is None or linear is None:
-        return "A run ended early, so there is no regret to compare."
-    change = 100 * (learned - linear) / linear
-    outcome = f"takes {-change:.0f} % off" if change < 0 else f"adds {change:.0f} % to"
-    states = "" if comparison.n_states == 1 else f" (median of {comparison.n_states} states)"
-    return (
-        f"The learned policy costs {100 * learned:.2f} % more than the optimum{states}; the linear "
-        f"H-infinity policy, which learns nothing, {100 * linear:.2f} %: learning {outcome} the excess."
-    )
-
-
-def too_short(comparison: Comparison) -> str:
-    """Return a warning that some runs end while their cost still grows."""
-    return (
-        f"The runs are too short for a regret of {', '.join(comparison.too_short)}: more than 0.1 % of "
-        "the cost is the estimate ζ'P ζ for the rest; raise simulation.duration."
-    )
-
-
-def summary(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
-    """Return header and rows of the summary: one row a policy."""
-    columns = "policy, cost, regret [%], position rms [m], effort [N² s], peak thrust [%], ended early"
-    header = columns.split(", ")
-    rows = []
-    for name, metrics in comparison.metrics.items():
-        rows.append(
-            [
-                CONTENDERS[name].label,
-                _number(metrics.cost, ".4f"),
-                _number(metrics.regret, ".3f", 100.0),
-                _number(metrics.position_rms, ".3f"),
-                _number(metrics.effort, ".1f"),
-                _number(metrics.peak_thrust, ".0f", 100.0),
-                metrics.stopped or "no",
-            ]
-        )
-    rows.append(
-        ["offline optimum", f"{comparison.optimal.attrs['value']:.4f}", "0.000", "", "", "", ""]
-    )
-    return header, rows
-
-
-def certificate(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
-    """Return header and rows of the optimum's certificate."""
-    attributes = comparison.optimal.attrs
-    meanings = {
-        "value_error": "relative error of the value: mesh, re-integration, horizon and saddle point",
-        "defect": "gap of the re-integrated trajectory, in half-widths",
-        "hji_residual": "residual of the HJI (7), relative to the state cost",
-        "costate_error": "costate against a finite difference of the value, relative",
-        "horizon_error": "relative change of the value when the horizon doubles",
-    }
-    rows = [[key, f"{attributes[key]:.1e}", meaning] for key, meaning in meanings.items()]
-    return ["certificate", "value", "meaning"], rows
-
-
-def conditions(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
-    """Return header and rows of the paper's conditions."""
-    words = {True: "yes", False: "no", None: "not known"}
-    rows = [
-        [c.name, c.paper, _number(c.value, ".4g"), _number(c.bound, ".4g"), words[c.holds], c.note]
-        for c in comparison.conditions
-    ]
-    return ["condition", "paper", "value", "bound", "holds", "note"], rows
-
-
 def _asked(comparison: Comparison) -> str:
     scenario = comparison.scenario
     state = ", ".join(f"{value:g}" for value in scenario.simulation.initial_state)
+    others = comparison.n_states - 1
+    more = f" and from {others} random states of the envelope" if others else ""
+    if scenario.simulation.mode == "game":
+        against = (
+            "The disturbance is a second player, who wants the opposite and pays γ² for his effort "
+            f"(γ = {scenario.game.gamma:g}); every policy meets the answer of this player to its own "
+            "control, so that V* is the least possible cost for all of them."
+        )
+    else:
+        kind = scenario.simulation.disturbance.kind
+        against = (
+            f"The disturbance is real ({kind}) and nobody knows it beforehand. The optimum is that of "
+            f"the game without it (γ = {scenario.game.gamma:g}): a picture, not a bound."
+        )
     return (
-        "<h2>What was asked</h2><p>From the state "
-        f"({escape(state)}) [m, rad, m/s, rad/s] the vehicle goes back to its station. The cost weighs "
-        "position, attitude and control, against a disturbance that pays γ² for its effort "
-        f"(γ = {scenario.game.gamma:g}). The learner has {comparison.station.basis.n_basis} basis "
-        f"functions and {scenario.samples.number} sample points, starts from the linear H-infinity "
-        "policy, and learns only during this run. The optimum of the same game is solved offline.</p>"
+        f"<p>From the state ({escape(state)}) [m, rad, m/s, rad/s]{more} the vehicle goes back to its "
+        "station. The cost is the integral of weighted squares of position, attitude, rates and "
+        f"control. {against} The learner has {comparison.station.basis.n_basis} basis functions, "
+        "starts from the linear H-infinity policy, and learns only during the run that is scored.</p>"
     )
 
 
-def _figure(key: str, path: Path) -> str:
-    data = base64.b64encode(path.read_bytes()).decode()
+def _words() -> str:
+    entries = "".join(f"<li><b>{escape(k)}</b>: {escape(v)}</li>" for k, v in WORDS.items())
+    return f"<ul>{entries}</ul>"
+
+
+def _folded(title: str, content: str) -> str:
+    return f"<details><summary>{escape(title)}</summary>{content}</details>"
+
+
+def _figure(key: str, wide: bytes, phone: bytes) -> str:
     caption = escape(CAPTIONS[key])
-    return f'<p>{caption}</p><img alt="{caption}" src="data:image/png;base64,{data}">'
+    return (
+        f"<figure><figcaption>{caption}</figcaption><picture>"
+        f'<source media="(max-width: 640px)" srcset="{_data(phone)}">'
+        f'<img alt="{caption}" src="{_data(wide)}"></picture></figure>'
+    )
+
+
+def _data(picture: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
 
 
 def _table(header: Iterable[str], rows: Iterable[Sequence[str]]) -> str:
@@ -180,8 +183,4 @@ def _cell(text: str) -> str:
 
 
 def _is_number(text: str) -> bool:
-    return text[:1].isdigit() or text[:1] == "-"
-
-
-def _number(value: float | None, form: str, factor: float = 1.0) -> str:
-    return "–" if value is None else f"{factor * value:{form}}"
+    return text[:1] in "0123456789-–" and text != ""

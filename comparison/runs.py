@@ -77,7 +77,7 @@ def online_record(
         attributes["wall_seconds"] = history.wall_seconds
         return to_dataset(history, attributes)
 
-    record = _reuse(path, attributes["key"], make)
+    record = reused(path, attributes["key"], make)
     if str(record.attrs["stopped"]).startswith("interrupted"):
         raise KeyboardInterrupt  # the part that was run is kept
     return record
@@ -104,7 +104,7 @@ def optimal_record(
     """
     start = scenario.initial_state if zeta0 is None else zeta0
     attributes = optimum_provenance(scenario, start)
-    record = _reuse(
+    record = reused(
         path, attributes["key"], lambda: optimum_or_failure(scenario, solver, start, attributes)
     )
     if "failed" in record.attrs:
@@ -227,7 +227,8 @@ def _extremal(solution: OfflineSolution, other: DirectSolution) -> dict[str, Any
     }
 
 
-def _reuse(path: Path | None, key: str, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+def reused(path: Path | None, key: str, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+    """Return the record at `path` if it is whole and of this key, or make it and keep it there."""
     if path is not None and path.is_file():
         try:
             kept = load(path)
