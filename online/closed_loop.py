@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -162,9 +163,9 @@ class _Loop:
 
     def _out_of_bounds(self) -> str | None:
         zeta, settings = self.state.zeta, self.settings
-        if not np.all(np.isfinite(zeta)):
+        if not np.isfinite(zeta).all():
             return "the state is not finite"
-        pitch = np.degrees(zeta[4])
+        pitch = math.degrees(zeta[4])
         if abs(pitch) > settings.pitch_limit:
             return f"the pitch left ±{settings.pitch_limit:g} deg ({pitch:.1f} deg)"
         far = np.abs(zeta) / self.station.half_widths

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -76,6 +77,8 @@ class Controller:
             raise InputError(f"the station is {station}, but must be four finite numbers x, y, z, psi")
         self.setup = scenario.station_keeping()
         self.station = np.array(station, dtype=float)
+        c, s = np.cos(station[3]), np.sin(station[3])
+        self._turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         if station[3] != 0.0 and any(self.setup.model.current):
             raise InputError(
                 "a known current can't be combined with a station heading other than 0; turn the "
@@ -123,13 +126,13 @@ class Controller:
             pose, rate = np.asarray(eta, dtype=float), np.asarray(eta_dot, dtype=float)
         except (TypeError, ValueError):
             raise InputError("eta and eta_dot must be 6 numbers each") from None
-        if not (dt > 0.0 and np.isfinite(dt)):
+        if not (dt > 0.0 and math.isfinite(dt)):
             raise InputError(f"dt is {dt}, but must be a positive time in seconds")
         if pose.shape != (6,) or rate.shape != (6,):
             raise InputError(
                 f"eta and eta_dot must have 6 entries each, but have {pose.shape} and {rate.shape}"
             )
-        if not (np.all(np.isfinite(pose)) and np.all(np.isfinite(rate))):
+        if not (np.isfinite(pose).all() and np.isfinite(rate).all()):
             raise InputError("eta and eta_dot must be finite, but contain NaN or infinity")
         self.zeta = require_state(self._error(pose, rate))
         self.last_step = None
@@ -154,12 +157,12 @@ class Controller:
 
         The dynamics don't depend on where north is, so the learned policy holds at every heading.
         """
-        heading = self.station[3]
-        c, s = np.cos(heading), np.sin(heading)
-        turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        yaw = np.arctan2(np.sin(eta[5] - heading), np.cos(eta[5] - heading))
-        position = turn @ (eta[:3] - self.station[:3])
-        return np.concatenate([position, eta[3:5], [yaw], turn @ eta_dot[:3], eta_dot[3:]])
+        zeta = np.concatenate([eta, eta_dot])
+        zeta[:3] = self._turn @ (eta[:3] - self.station[:3])
+        zeta[6:9] = self._turn @ eta_dot[:3]
+        turned = float(eta[5] - self.station[3])
+        zeta[5] = math.atan2(math.sin(turned), math.cos(turned))
+        return zeta
 
 
 def sample_strategy(settings: SampleSettings, setup: StationKeeping) -> SampleStrategy:

@@ -6,6 +6,7 @@ Water moves the vehicle through its relative velocity (see `symbolic.dynamics`);
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -34,9 +35,16 @@ class Disturbance:
 
 
 class DisturbanceSource(Protocol):
-    """d(t) at a position; `breaks` are the times at which it is not smooth."""
+    """d(t) at a position.
+
+    Attributes
+    ----------
+    breaks : times at which it is not smooth
+    steady : whether it is constant between them, wherever the vehicle is
+    """
 
     breaks: tuple[float, ...]
+    steady: bool
 
     def at(self, t: float, position: Array) -> Disturbance:
         """Return the disturbance at time t [s] and earth-frame position (3,) [m] from the station."""
@@ -49,13 +57,15 @@ class Force:
     def __init__(self, amplitude: Array, frequency: float, start: float) -> None:
         self.amplitude, self.frequency, self.start = amplitude, frequency, start
         self.breaks: tuple[float, ...] = (start,) if np.any(amplitude) else ()
+        self.steady = frequency == 0.0
+        self._still = np.zeros(3)
 
     def at(self, t: float, position: Array) -> Disturbance:
         """Return the force at time t; a frequency of 0 is a constant force."""
-        on = t >= self.start
-        phase = 2.0 * np.pi * self.frequency * (t - self.start)
-        factor = on * (np.sin(phase) if self.frequency > 0.0 else 1.0)
-        return Disturbance(factor * self.amplitude, np.zeros(3), np.zeros(3))
+        factor = 1.0 if t >= self.start else 0.0
+        if not self.steady:
+            factor *= math.sin(2.0 * np.pi * self.frequency * (t - self.start))
+        return Disturbance(factor * self.amplitude, self._still, self._still)
 
 
 class CurrentStep:
@@ -64,6 +74,7 @@ class CurrentStep:
     def __init__(self, velocity: Array, start: float) -> None:
         self.velocity, self.start = velocity, start
         self.breaks: tuple[float, ...] = (start,)
+        self.steady = True
 
     def at(self, t: float, position: Array) -> Disturbance:
         """Return the current at time t; the step's infinite acceleration is left out."""
@@ -97,6 +108,7 @@ class Waves:
     """
 
     breaks: tuple[float, ...] = ()
+    steady = False
 
     def __init__(self, settings: DisturbanceSettings, n_components: int = 60) -> None:
         rng = np.random.default_rng(settings.seed)

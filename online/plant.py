@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import casadi
 import numpy as np
-from casadi import DM, SX
+from casadi import DM, MX, SX
 
 from ..symbolic import RunError, StationKeeping, Vehicle
 from ..symbolic.dynamics import acceleration, earth_frame
-from ..symbolic.integration import integrate
-from ..symbolic.kernel import dense_function, export
+from ..symbolic.integration import dormand_prince_error, dormand_prince_step, integrate
+from ..symbolic.kernel import Kernel, dense_function, export
 from ..symbolic.kinematics import jacobian, jacobian_inverse
 from ..symbolic.vehicle import Array
 from .disturbance import DisturbanceSource
@@ -55,7 +56,9 @@ class HeldPlant:
         self.station = station
         self.source = source
         self.tolerance = tolerance
-        self._kernel, _ = export(_held_rates(station, vehicle), compiled=station.model.compiled)
+        text = None if vehicle is None else vehicle.model_dump_json()
+        self._kernel, self._step = _kernels(station, text)
+        self._absolute = tolerance * np.append(1e-2 * station.half_widths, [1e-2, 1e-2])
         self._current = np.array(station.model.current)
 
     def rates(self, t: float, zeta: Array, tau_b: Array, tau_d: Array) -> tuple[Array, Array, Array]:
@@ -72,33 +75,81 @@ class HeldPlant:
         return rates, u_control, disturbance
 
     def advance(self, t: float, state: PlantState, tau_b: Array, tau_d: Array, dt: float) -> PlantState:
-        """Integrate over dt with the body wrenches τ_b and τ_d held, by scipy's DOP853.
+        """Integrate over dt with the body wrenches τ_b and τ_d held, by DOP853.
+
+        One compiled step over dt where the disturbance is steady and the error estimate allows it,
+        otherwise scipy's.
 
         Raises
         ------
         RunError
             If the integration fails or becomes too stiff, or anything is not finite.
         """
-        if not (np.all(np.isfinite(tau_b)) and np.all(np.isfinite(tau_d))):
+        if not (np.isfinite(tau_b).all() and np.isfinite(tau_d).all()):
             raise RunError(f"the wrench is not finite at t = {t:.2f} s")
         y = np.append(state.zeta, [state.cost, state.attenuated])
         edges = [t, *(b for b in self.source.breaks if t < b < t + dt), t + dt]
-        absolute = self.tolerance * np.append(1e-2 * self.station.half_widths, [1e-2, 1e-2])
         for start, end in pairwise(edges):
-            y = integrate(
-                self._held(tau_b, tau_d, np.nextafter(end, start)),
-                y,
-                np.array([start, end]),
-                rtol=self.tolerance,
-                atol=absolute,
-                first_step=end - start,
-                max_calls=20_000,
-            )[-1]
+            stepped = self._one_step(start, end, y, tau_b, tau_d) if self.source.steady else None
+            y = self._integrated(start, end, y, tau_b, tau_d) if stepped is None else stepped
         return PlantState(y[:12], float(y[12]), float(y[13]))
+
+    def _one_step(self, start: float, end: float, y: Array, tau_b: Array, tau_d: Array) -> Array | None:
+        """Return y at the end of one step, or None where its error is too large."""
+        here = self.source.at(start, y[:3])
+        water = here.water_velocity + self._current
+        held = (tau_b, tau_d, here.force, water, here.water_acceleration)
+        reached, error_5, error_3 = self._step(y, end - start, *held)
+        scale = self._absolute + self.tolerance * np.maximum(np.abs(y), np.abs(reached))
+        # written so that what is not finite is not accepted
+        accepted = dormand_prince_error(end - start, error_5, error_3, scale) < 1.0
+        return reached if accepted else None
+
+    def _integrated(self, start: float, end: float, y: Array, tau_b: Array, tau_d: Array) -> Array:
+        reached = integrate(
+            self._held(tau_b, tau_d, np.nextafter(end, start)),
+            y,
+            np.array([start, end]),
+            rtol=self.tolerance,
+            atol=self._absolute,
+            first_step=end - start,
+            max_calls=20_000,
+        )[-1]
+        return np.asarray(reached)
 
     def _held(self, tau_b: Array, tau_d: Array, last: float) -> Callable[[float, Array], Array]:
         """Return the rates with wrenches held, up to the time `last` before the source breaks."""
         return lambda t, y: self.rates(min(t, last), y[:12], tau_b, tau_d)[0]
+
+
+@lru_cache(maxsize=8)
+def _kernels(station: StationKeeping, vehicle: str | None) -> tuple[Kernel, Kernel]:
+    """Return the rates under held wrenches and a step of them; `vehicle` is the true one, as JSON."""
+    rates = _held_rates(station, None if vehicle is None else Vehicle.model_validate_json(vehicle))
+    step = _held_step(rates)
+    compiled = station.model.compiled
+    return (
+        export(rates, compiled=compiled)[0],
+        export(step, compiled=compiled, operations=step.n_instructions())[0],
+    )
+
+
+def _held_step(rates: casadi.Function) -> casadi.Function:
+    """Return one step of DOP853 of the rates, everything but the state held."""
+    y, h = MX.sym("y", 14), MX.sym("h")
+    held = {name: MX.sym(name, *rates.size_in(name)) for name in rates.name_in()[1:]}
+
+    def rate(point: MX) -> MX:
+        return rates(point[:12], *held.values())[0]
+
+    reached, error_5, error_3 = dormand_prince_step(rate, y, h)
+    return casadi.Function(
+        "held_step",
+        [y, h, *held.values()],
+        [reached, error_5, error_3],
+        ["y", "h", *held],
+        ["reached", "error_5", "error_3"],
+    )
 
 
 def _held_rates(station: StationKeeping, true: Vehicle | None = None) -> casadi.Function:

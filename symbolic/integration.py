@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Literal, TypeVar
 
 import numpy as np
 from casadi import MX, SX
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, solve_ivp
 
 from .errors import RunError
 from .vehicle import Array
@@ -22,6 +23,41 @@ def runge_kutta_step(rate: Callable[[E], E], y: E, h: E | float) -> E:
     k_3 = rate(y + h / 2 * k_2)
     k_4 = rate(y + h * k_3)
     return y + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+
+
+def dormand_prince_step(rate: Callable[[MX], MX], y: MX, h: MX) -> tuple[MX, MX, MX]:
+    """Return y after one step of DOP853, and the two error estimates per unit of h, as expressions.
+
+    The method of order 8 of Dormand and Prince with its embedded ones of order 5 and 3 (Hairer, Nørsett
+    and Wanner 1993, sec. II.10), scipy's coefficients; for a rate that does not depend on time.
+    """
+    slopes = [rate(y)]
+    for row in DOP853.A[1 : DOP853.n_stages]:
+        slopes.append(rate(y + h * _combined(row, slopes)))
+    end = y + h * _combined(DOP853.B, slopes)
+    slopes.append(rate(end))
+    return end, _combined(DOP853.E5, slopes), _combined(DOP853.E3, slopes)
+
+
+def _combined(coefficients: Array, slopes: list[MX]) -> MX:
+    """Return Σ c_i k_i over the slopes that there are, without the zeros."""
+    terms = [c * k for c, k in zip(coefficients.tolist(), slopes, strict=False) if c != 0.0]
+    total: MX = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+def dormand_prince_error(h: float, error_5: Array, error_3: Array, scale: Array) -> float:
+    """Return the error of a step of DOP853 relative to `scale`; the step is accepted below 1.
+
+    |h| e_5^2 / sqrt(n (e_5^2 + e_3^2 / 100)) with the norms of both scaled estimates.
+    """
+    scaled_5, scaled_3 = error_5 / scale, error_3 / scale
+    fifth, third = float(scaled_5 @ scaled_5), float(scaled_3 @ scaled_3)
+    if fifth == 0.0 and third == 0.0:
+        return 0.0
+    return h * fifth / math.sqrt((fifth + 0.01 * third) * len(scale))
 
 
 def integrate(

@@ -87,7 +87,7 @@ def test_ctrl_c_during_compare_keeps_the_finished_records(user_folder: Path) -> 
 
 INTERRUPTIONS = [
     (HeldPlant, "advance", 30),
-    (HeldPlant, "rates", 200),
+    (HeldPlant, "rates", 50),
     (Learner, "step", 3),
     (Learner, "rank_margin", 1),
     (Learner, "rank_margin", 2),

@@ -126,7 +126,9 @@ def test_current_step_inside_a_period_is_met_exactly() -> None:
 
 
 class Counted:
-    """A source that counts how often it is asked."""
+    """A source that counts how often it is asked, by scipy's integrator alone."""
+
+    steady = False
 
     def __init__(self, settings: DisturbanceSettings) -> None:
         self.source, self.calls = build_disturbance(settings), 0
@@ -148,6 +150,41 @@ def test_step_does_not_shorten_the_integrators_steps(start: float) -> None:
         held.advance(0.0, PlantState(ZETA, 0.0, 0.0), TAU_B, NOTHING, 0.02)
         counts.append(source.calls)
     assert counts[1] <= 3 * counts[0], counts
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        DisturbanceSettings(),
+        DisturbanceSettings(kind="constant", force=(3, -2, 1, 0.1, 0, 0.2), start=0.013),
+        DisturbanceSettings(kind="current", velocity=(0.4, 0.2, -0.1), start=0.01),
+    ],
+    ids=lambda settings: settings.kind,
+)
+@pytest.mark.parametrize("dt", [0.02, 0.5])
+def test_the_compiled_step_goes_where_scipys_integrator_goes(
+    settings: DisturbanceSettings, dt: float
+) -> None:
+    """At 1e-12 scipy's DOP853 is exact here; one step over 0.5 s is too long and is refused."""
+    ends = []
+    for source, tolerance in ((build_disturbance(settings), 1e-8), (Counted(settings), 1e-12)):
+        state = PlantState(ZETA, 1.0, 0.5)
+        for i in range(5):
+            state = HeldPlant(station(), source, tolerance).advance(
+                i * dt, state, TAU_B, 0.1 * TAU_B, dt
+            )
+        ends.append(np.append(state.zeta, [state.cost, state.attenuated]))
+    gap = np.abs((ends[0] - ends[1])[:12] / station().half_widths).max()
+    assert gap < 1e-7
+    np.testing.assert_allclose(ends[0][12:], ends[1][12:], rtol=1e-6)
+
+
+def test_a_step_that_is_too_long_is_refused_by_its_own_estimate() -> None:
+    held = HeldPlant(station(), build_disturbance(DisturbanceSettings()), 1e-8)
+    y = np.append(ZETA, [0.0, 0.0])
+    assert held._one_step(0.0, 0.02, y, TAU_B, NOTHING) is not None
+    assert held._one_step(0.0, 5.0, y, TAU_B, NOTHING) is None
+    assert held._one_step(0.0, 0.02, np.full(14, np.nan), TAU_B, NOTHING) is None
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
