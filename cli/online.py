@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> int:
         "weights": {name: _last(record, name) for name in ("critic", "actor_1", "actor_2")},
         "bellman_error": _last(record, "bellman_error"),
         "sample_error": _last(record, "sample_error"),
-        "rank_margin": _last(record, "rank_margin"),
+        **_monitored(record),
         "cost": metrics.cost,
         "final_state": record["zeta"].values[-1],
         "real_time_factor": float(record["time"][-1]) / float(record.attrs["wall_seconds"]),
@@ -60,6 +60,17 @@ def _margin(record: xr.Dataset, station: StationKeeping) -> float | None:
         return None
 
 
+def _monitored(record: xr.Dataset) -> dict[str, float | None]:
+    """Return the worst that the monitor saw over the run, each None if it saw nothing."""
+    least = ("rank_margin", "row_margin")
+    largest = ("regressor", "fixed_error_max", "actor_norm", "actor_distance")
+    answer: dict[str, float | None] = dict.fromkeys((*least, *largest))
+    if record.sizes["look_time"]:
+        answer |= {name: float(record[name].min()) for name in least}
+        answer |= {name: float(record[name].max()) for name in largest}
+    return answer
+
+
 def _last(record: xr.Dataset, name: str) -> Any:
     values = record[name].values
     return values[-1] if len(values) else None
@@ -71,7 +82,10 @@ def _print(answer: dict[str, Any], mode: str) -> None:
         ["cost (with ζ'P ζ for the rest)", _form(answer["cost"], ".4f")],
         ["Bellman error at the state [cost/s]", _form(answer["bellman_error"], ".2e")],
         ["Bellman error at the samples, rms, relative", _form(answer["sample_error"], ".3f")],
-        ["rank margin of (18)", _form(answer["rank_margin"], ".2e")],
+        ["rank margin of (18) at the fixed samples, least", _form(answer["rank_margin"], ".2e")],
+        ["margin of the critic's own rows and leash, least [1/s]", _form(answer["row_margin"], ".2e")],
+        ["largest regressor |ω| at the fixed samples [1/s]", _form(answer["regressor"], ".3g")],
+        ["largest actor, part of the projection's bound", _form(answer["actor_norm"], ".3f")],
         ["simulated time over wall time", _form(answer["real_time_factor"], ".1f")],
         ["final state", final],
         ["ended early", answer["stopped"] or "no"],

@@ -9,10 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize
 
-from ..online import Learner, draw_samples
+from ..online import Learner, draw_samples, rank_margin
+from ..online.controller import fixed_points
 from ..online.samples import regressor_spectrum
 from ..symbolic import StationKeeping
+from ..symbolic.vehicle import Array
 from .ideal import Bounds
 from .scenario import Scenario
 
@@ -40,30 +43,36 @@ class Condition:
     note: str
 
 
-def check(scenario: Scenario, bounds: Bounds | None = None) -> list[Condition]:
+def check(
+    scenario: Scenario, bounds: Bounds | None = None, c_lower: float | None = None
+) -> list[Condition]:
     """Return every assumption and condition of the paper with its value for the scenario.
 
-    `bounds` on ε and ε' come from ideal weights, see `comparison.ideal.load_bounds`.
+    Parameters
+    ----------
+    bounds : on ε and ε', from ideal weights, see `comparison.ideal.load_ideal`
+    c_lower : infimum over a run of (18)'s λ_min; that at the initial weights if None
     """
     station = scenario.station_keeping()
-    samples = scenario.samples
-    points = draw_samples(station.envelope, samples.number, samples.seed, inner=samples.inner)
     learner = Learner(
         station.problem,
         station.basis,
         scenario.learner.model_copy(update={"error": "bellman", "safeguard": False}),
-        points,
+        fixed_points(scenario.samples, station),
         station.riccati_weights,
         scenario.initial_weights(),
         station.functions,
     )
+    residual = learner.sample_residual()
+    margin = 0.0 if residual is None else rank_margin(residual.omega)
+    margin = margin if c_lower is None else min(margin, c_lower)
     return [
         _pitch(scenario),
         *_inertia(scenario, station),
         _equilibrium(station),
         _representation(bounds),
         *_samples(scenario, learner),
-        *_gains(scenario, station, learner, bounds),
+        *_gains(scenario, station, margin, bounds),
         *_attenuation(station),
     ]
 
@@ -181,7 +190,7 @@ def _samples(scenario: Scenario, learner: Learner) -> list[Condition]:
 
 
 def _gains(
-    scenario: Scenario, station: StationKeeping, learner: Learner, bounds: Bounds | None
+    scenario: Scenario, station: StationKeeping, margin: float, bounds: Bounds | None
 ) -> list[Condition]:
     """(24) and (25) share a free ε > 0: (24) is looked at with the least that (25) admits, and back."""
     settings = scenario.learner
@@ -189,7 +198,6 @@ def _gains(
     gain = settings.gain_critic
     actors = settings.gain_actor_1 + settings.gain_actor_2
     known = actors / (2.0 * gain) if gain > 0.0 else np.inf
-    margin = learner.rank_margin()
     q_lower = float(np.linalg.eigvalsh(station.game.Q).min())
     fails = margin <= known
     first, second, holds = None, known, False if fails else None
@@ -213,7 +221,8 @@ def _gains(
             q_lower,
             first,
             None if first is None else q_lower > first,
-            f"λ_min(Q); η_c = {gain:g}, L_f = {lipschitz:.4g} = sup|f|/|ζ| over samples; {first_note}",
+            f"λ_min(Q); η_c = {gain:g}, L_f = {lipschitz:.4g} = sup|f|/|ζ| over the envelope; "
+            + first_note,
         ),
         Condition(
             "c_lower > L_f sup|ε'| / (2 ε) + (η_a1 + η_a2) / (2 η_c)",
@@ -227,10 +236,23 @@ def _gains(
 
 
 def drift_bound(station: StationKeeping, n_points: int, seed: int = 0) -> float:
-    """Return L_f, the largest |f(ζ)| / |ζ| over seeded points of the envelope, trim taken out."""
+    """Return L_f = sup |f(ζ)| / |ζ| over the envelope, trim taken out.
+
+    The largest of seeded points, and of local maxima that are climbed to from the best five of them.
+    """
     points = draw_samples(station.envelope, n_points, seed)
     f = station.functions.at(points).f
-    return float((np.linalg.norm(f, axis=1) / np.linalg.norm(points, axis=1)).max())
+    ratios = np.linalg.norm(f, axis=1) / np.linalg.norm(points, axis=1)
+
+    def steepness(x: Array) -> float:
+        zeta = station.envelope * x
+        return -float(np.linalg.norm(station.model.drift(zeta)) / np.linalg.norm(zeta))
+
+    tops = [
+        minimize(steepness, points[i] / station.envelope, method="L-BFGS-B", bounds=[(-1.0, 1.0)] * 12)
+        for i in np.argsort(-ratios)[:5]
+    ]
+    return float(max(ratios.max(), *(-top.fun for top in tops)))
 
 
 def _attenuation(station: StationKeeping) -> list[Condition]:

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..offline import Plant
-from ..online import Learner, LearnerSettings, draw_samples
+from ..online import Learner, LearnerSettings, draw_samples, rank_margin
 from ..symbolic import Basis, Problem, RunError, quadratic
-from ..symbolic.integration import integrate
 from ..symbolic.vehicle import Array
+from .game_run import advance
 from .scenario import Scenario
 
 # the Bellman error alone, without what holds the weights
@@ -140,20 +140,22 @@ def excitation_run(
         spectrum = np.linalg.eigvalsh(gram)
         excited = float(np.sum(spectrum > 1e-6 * max(spectrum[-1], 1e-300)))
         error = float(np.linalg.norm(learner.critic - ideal) / np.linalg.norm(ideal))
-        rows.append((i * dt, excited, learner.rank_margin(), error))
+        residual = learner.sample_residual()
+        margin = 0.0 if residual is None else rank_margin(residual.omega)
+        rows.append((i * dt, excited, margin, error))
         try:
             learner.step(zeta, dt)
-            zeta = _advance(learner, plant, zeta, dt)
+            zeta = advance(learner, plant, zeta, dt)
         except (RunError, np.linalg.LinAlgError) as fault:
             stopped = f"ended at t = {i * dt:.2f} s: {fault}"
             break
-    time, excited_count, margin, error_series = np.array(rows).T
+    time, excited_count, margins, error_series = np.array(rows).T
     return ExcitationRun(
         name=name,
         n_samples=len(samples),
         time=time,
         excited=excited_count,
-        rank_margin=margin,
+        rank_margin=margins,
         weight_error=error_series,
         n_basis=basis.n_basis,
         stopped=stopped,
@@ -164,17 +166,3 @@ def _regressor(learner: Learner, plant: Plant, zeta: Array) -> Array:
     u_control, u_disturbance = learner.policies(zeta)
     (sigma_prime,) = learner.functions.sigma_prime(zeta)
     return np.asarray(sigma_prime @ plant.rate(zeta, u_control + u_disturbance))
-
-
-def _advance(learner: Learner, plant: Plant, zeta: Array, dt: float) -> Array:
-    def rhs(t: float, state: Array) -> Array:
-        u_control, u_disturbance = learner.policies(state)
-        return plant.rate(state, u_control + u_disturbance)
-
-    span = np.array([0.0, dt])
-    reached = integrate(
-        rhs, zeta, span, rtol=1e-6, atol=1e-8, method="RK45", first_step=dt / 4, max_calls=5000
-    )[-1]
-    if np.abs(reached / plant.problem.scale).max() > 10.0:
-        raise RunError("the state left ten times the envelope")
-    return np.asarray(reached)

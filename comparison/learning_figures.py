@@ -102,24 +102,19 @@ def draw_field(page: Page, analysis: xr.Dataset) -> None:
 
 
 def draw_bellman(page: Page, learned: xr.Dataset, error: str) -> None:
-    """Draw the error that is learned from and δ at the state, and the rank margin of (18).
+    """Draw the error that is learned from, and δ at the state.
 
     `error`: `learner.error` of the run, which says what the first of them is.
     """
     time = learned["learn_time"].values
-    with page.figure("bellman", "Bellman error and rank margin", 1, 3, 3.4) as panels:
-        samples, state, margin = panels
+    with page.figure("bellman", "What is learned from, and the Bellman error", 1, 2, 3.4) as panels:
+        samples, state = panels
         samples.plot(time, learned["sample_error"], color=LEARNED)
         samples.set_title(ERRORS[error])
         samples.set_ylim(bottom=0.0)
         state.plot(time, np.abs(learned["bellman_error"]), color=LEARNED)
         state.set_yscale("log")
         state.set_title("|δ| at the state [cost/s]")
-        monitored = np.isfinite(learned["rank_margin"].values)
-        margin.plot(time[monitored], learned["rank_margin"].values[monitored], color=OPTIMAL)
-        margin.set_ylim(bottom=0.0)
-        margin.set_title("rank margin of (18), λ_min [-]")
-        margin.yaxis.set_major_formatter(SCIENTIFIC)
         for axes in panels:
             time_axis(axes, float(time[-1]))
 

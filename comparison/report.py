@@ -48,8 +48,7 @@ CAPTIONS = {
     "far off the learned value and control are there, and how far the linear ones.",
     "weights": "The weights of the value while it is learned. W* fits the optimum best over the "
     "whole envelope; the learner fits the way that the vehicle is on, so it need not end there.",
-    "bellman": "The error that is learned from, the Bellman error at the state, and what the paper's "
-    "rank condition asks to be positive.",
+    "bellman": "The error that is learned from, and the Bellman error at the state.",
     "field": "How well the equation of the optimum (HJI) is met around the vehicle (dot), over two of "
     "its twelve states; the line is its way.",
     "excitation": "The paper's claim: with sample points the weights converge although the way excites "

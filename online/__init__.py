@@ -5,6 +5,7 @@ from .closed_loop import History, Policy, run
 from .controller import Controller
 from .disturbance import build_disturbance
 from .learner import Learner, LearnerStep
+from .monitor import Look, Monitor
 from .record import load, load_weights, save, to_dataset
 from .samples import draw_samples, rank_margin
 from .settings import (
@@ -24,6 +25,8 @@ __all__ = [
     "Learner",
     "LearnerSettings",
     "LearnerStep",
+    "Look",
+    "Monitor",
     "NoiseSettings",
     "Policy",
     "SampleSettings",

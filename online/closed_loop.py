@@ -13,9 +13,10 @@ import numpy as np
 from ..symbolic import InputError, RunError, StationKeeping, Vehicle
 from ..symbolic.vehicle import Array
 from .allocation import Allocator
-from .controller import Controller, ControllerScenario
+from .controller import Controller, ControllerScenario, fixed_points
 from .disturbance import build_disturbance
-from .learner import Learner, LearnerStep
+from .learner import LearnerStep
+from .monitor import Look, Monitor
 from .noise import MeasurementNoise
 from .plant import HeldPlant, PlantState
 from .settings import SimulationSettings
@@ -66,7 +67,6 @@ class History:
     learn_time: list[float] = field(default_factory=list)
     bellman_error: list[float] = field(default_factory=list)
     sample_error: list[float] = field(default_factory=list)
-    rank_margin: list[float] = field(default_factory=list)
     projecting: list[bool] = field(default_factory=list)
     predicted_cost: list[float] = field(default_factory=list)
     accepted: list[float] = field(default_factory=list)
@@ -74,6 +74,7 @@ class History:
     critic: list[Array] = field(default_factory=list)
     actor_1: list[Array] = field(default_factory=list)
     actor_2: list[Array] = field(default_factory=list)
+    looks: list[Look] = field(default_factory=list)
     remembered: Array | None = None
     stopped: str | None = None
     wall_seconds: float = 0.0
@@ -109,6 +110,9 @@ class _Loop:
         self.settings = scenario.simulation
         self.station: StationKeeping = scenario.station_keeping()
         self.policy = policy
+        self.monitor = None
+        if isinstance(policy, Controller):
+            self.monitor = Monitor(policy.learner, fixed_points(scenario.samples, self.station))
         source = build_disturbance(self.settings.disturbance)
         vehicle = scenario.plant_vehicle()
         self.plant = HeldPlant(self.station, source, self.settings.tolerance, vehicle)
@@ -185,11 +189,12 @@ class _Loop:
         history.cost.append(state.cost)
         history.attenuated.append(state.attenuated)
         if isinstance(self.policy, Controller) and self.policy.last_step is not None:
-            self._record_learner(self.policy.last_step, self.policy.learner)
+            self._record_learner(self.policy.last_step)
 
-    def _record_learner(self, seen: LearnerStep, learner: Learner, *, last: bool = False) -> None:
+    def _record_learner(self, seen: LearnerStep, *, last: bool = False) -> None:
         history = self.history
-        monitored = last or len(history.learn_time) % self.settings.monitor_every == 0
+        if self.monitor and (last or len(history.learn_time) % self.settings.monitor_every == 0):
+            history.looks.append(self.monitor.look(self.t, seen))
         history.learn_time.append(self.t)
         history.bellman_error.append(seen.bellman_error)
         history.sample_error.append(seen.sample_error)
@@ -197,7 +202,6 @@ class _Loop:
         history.predicted_cost.append(seen.predicted_cost)
         history.accepted.append(seen.accepted)
         history.fallback.append(seen.fallback)
-        history.rank_margin.append(learner.rank_margin() if monitored else np.nan)
         history.critic.append(seen.critic)
         history.actor_1.append(seen.actor_1)
         history.actor_2.append(seen.actor_2)
@@ -209,7 +213,7 @@ class _Loop:
             self.history.policy_mean = float(np.mean(self.policy_seconds))
         if isinstance(self.policy, Controller) and self.policy.learn:
             learner = self.policy.learner
-            self._record_learner(learner.observe(self.policy.zeta), learner, last=True)
+            self._record_learner(learner.observe(self.policy.zeta), last=True)
             self.history.remembered = None if learner.memory is None else learner.memory.weights
 
 

@@ -175,9 +175,13 @@ def sample_strategy(settings: SampleSettings, setup: StationKeeping) -> SampleSt
             spread=settings.spread,
             ahead=settings.ahead,
         )
-    shrinking = settings.strategy == "shrinking"
-    box = setup.half_widths if shrinking else setup.envelope
-    points = draw_samples(box, settings.number, settings.seed, inner=settings.inner)
-    if shrinking:
-        return ShrinkingSamples(points, setup.half_widths, settings.spread)
-    return FixedSamples(points)
+    if settings.strategy == "shrinking":
+        box, inner = setup.half_widths, settings.inner
+        points = draw_samples(box, settings.number, settings.seed, inner=inner)
+        return ShrinkingSamples(points, box, settings.spread)
+    return FixedSamples(fixed_points(settings, setup))
+
+
+def fixed_points(settings: SampleSettings, setup: StationKeeping) -> Array:
+    """Return the fixed ζ_j of (18), in the envelope, whatever the strategy, shape (N, 12)."""
+    return draw_samples(setup.envelope, settings.number, settings.seed, inner=settings.inner)

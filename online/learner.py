@@ -14,7 +14,7 @@ from .critic import LeastSquares, NormalEquations, gradient_step, row_weights
 from .memory import Memory
 from .rows import BellmanSource, CostateSource, PathRows, RowSource, SampleRows, Weights
 from .safeguard import Safeguard
-from .samples import FixedSamples, SampleStrategy, rank_margin
+from .samples import FixedSamples, SampleStrategy
 from .settings import LearnerSettings, SampleSettings
 
 
@@ -29,6 +29,7 @@ class LearnerStep:
     sample_error : rms over the samples of δ_j / (ζ_j'Qζ_j), or the root of the relative regret along
         the predicted paths; NaN without samples
     projecting : whether the smooth projection acts on an actor
+    rows : what the critic learns from, state, samples and leash
     predicted_cost : J of the policy in use before the actors moved; NaN without safeguard
     accepted : part of the actors' step that was certified; 1 without safeguard
     fallback : whether the policy in use after the step is the linear one, since no other was certified
@@ -40,6 +41,7 @@ class LearnerStep:
     bellman_error: float
     sample_error: float
     projecting: bool
+    rows: NormalEquations
     predicted_cost: float = np.nan
     accepted: float = 1.0
     fallback: bool = False
@@ -113,11 +115,11 @@ class Learner:
             actors, cost, restarted = self._guard.certified(zeta, actors)
         self.actor_1, self.actor_2 = actors
         self._source.move(zeta, self._weights)
-        seen, rows = self._observe(zeta)
+        seen = self.observe(zeta)
         if self.settings.rule == "gradient":
-            self.critic = gradient_step(self.critic, rows, dt)
+            self.critic = gradient_step(self.critic, seen.rows, dt)
         else:
-            self.critic = self._least_squares.step(self.critic, rows, dt)
+            self.critic = self._least_squares.step(self.critic, seen.rows, dt)
         gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
         proposed = (
             actor_step(actors[0], self.critic, gains[0], dt, self.projection),
@@ -143,7 +145,18 @@ class Learner:
 
     def observe(self, zeta: Array) -> LearnerStep:
         """Return what a step at ζ (n,) would see at the present samples, without moving anything."""
-        return self._observe(zeta)[0]
+        terms = self._terms(zeta[None, :])
+        here = self._residual(terms, self._weights)
+        there = self._source.rows(self._weights)
+        return LearnerStep(
+            critic=self.critic,
+            actor_1=self.actor_1,
+            actor_2=self.actor_2,
+            bellman_error=float(here.delta[0]),
+            sample_error=np.nan if there is None else there.error,
+            projecting=any(self.projection.active(actor) for actor in self._weights[1:]),
+            rows=self._rows(terms, here, there),
+        )
 
     def policies(self, zeta: Array) -> tuple[Array, Array]:
         """Return û_1 (14) and û_2 (15) at ζ, each (k,)."""
@@ -163,19 +176,12 @@ class Learner:
         rows = self._source.rows(self._weights)
         return None if rows is None else rows.residual
 
-    def rank_margin(self) -> float:
-        """Return λ_min of (18) under the present actors; 0 without samples."""
-        residual = self.sample_residual()
-        return 0.0 if residual is None else rank_margin(residual.omega)
-
     @property
     def _weights(self) -> Weights:
         return self.critic, self.actor_1, self.actor_2
 
-    def _observe(self, zeta: Array) -> tuple[LearnerStep, NormalEquations]:
-        terms = self._terms(zeta[None, :])
-        here = self._residual(terms, self._weights)
-        there = self._source.rows(self._weights)
+    def _rows(self, terms: BellmanTerms, here: Residual, there: SampleRows | None) -> NormalEquations:
+        """Sum the rows at the state and at the samples, and the leash."""
         omega, delta = here.omega, here.delta
         weights = self.settings.gain_critic * self._row_weights(omega, terms.state_cost)
         if self.settings.error == "costate":
@@ -186,17 +192,9 @@ class Learner:
                 np.append(delta, there.residual.delta),
             )
             weights = np.append(weights, self._gained(there))
-        seen = LearnerStep(
-            critic=self.critic,
-            actor_1=self.actor_1,
-            actor_2=self.actor_2,
-            bellman_error=float(here.delta[0]),
-            sample_error=np.nan if there is None else there.error,
-            projecting=any(self.projection.active(actor) for actor in self._weights[1:]),
-        )
         leash = self._fixed_leash if self._fixed_leash is not None else self._leash_of(there)
         offset = self.critic - self.reference
-        return seen, NormalEquations.of(omega, delta, weights, leash, offset)
+        return NormalEquations.of(omega, delta, weights, leash, offset)
 
     def _terms(self, points: Array) -> BellmanTerms:
         return BellmanTerms.at(points, self.functions.at(points), self.game)

@@ -19,11 +19,13 @@ import xarray as xr
 from ..symbolic import InputError
 from ..symbolic.vehicle import Array
 from .closed_loop import STATE_NAMES, History
+from .monitor import Look
 
+PLAYERS = ("control", "disturbance")
 FORCE_NAMES = ("X", "Y", "Z", "K", "M", "N")
 OVER_TIME = ("time", "zeta", "tau_b", "u_control", "disturbance", "cost", "attenuated")
 OVER_LEARNING = (
-    *("learn_time", "bellman_error", "sample_error", "rank_margin", "projecting"),
+    *("learn_time", "bellman_error", "sample_error", "projecting"),
     *("predicted_cost", "accepted", "fallback"),
     *("critic", "actor_1", "actor_2"),
 )
@@ -35,9 +37,10 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     """Return the record of a run.
 
     Dimensions: `time` (control steps), `learn_time` (learning steps, each with the weights before it,
-    and the end of the run), `state`, `force`, `basis`, and with thruster limits `thruster`. `tau_b` is
-    the wrench that the vehicle got. Attributes: `saturated`, the share of the control steps at which
-    the least-norm thrusts exceeded a limit; median and mean wall time of a policy's step [us].
+    and the end of the run), `look_time` (looks of the monitor), `player` (control, disturbance),
+    `state`, `force`, `basis`, and with thruster limits `thruster`. `tau_b` is the wrench that the
+    vehicle got. Attributes: `saturated`, the share of the control steps at which the least-norm thrusts
+    exceeded a limit; median and mean wall time of a policy's step [us].
     """
     m = len(history.critic[0]) if history.critic else 0
 
@@ -53,12 +56,14 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
         n = n_time if name in OVER_TIME else n_learn
         return np.array(getattr(history, name)[:n], dtype=float)
 
-    variables = _variables(stack, series, m)
+    variables = _variables(stack, series, m) | _looks(history.looks)
     coordinates = {
         "time": ("time", series("time"), {"units": "s"}),
         "learn_time": ("learn_time", series("learn_time"), {"units": "s"}),
+        "look_time": ("look_time", [look.time for look in history.looks], {"units": "s"}),
         "state": list(STATE_NAMES),
         "force": list(FORCE_NAMES),
+        "player": list(PLAYERS),
     }
     data: dict[str, tuple[tuple[str, ...], Array, dict[str, str]]] = {
         name: (dims, values, {"units": unit}) for name, (dims, values, unit) in variables.items()
@@ -89,7 +94,6 @@ def _variables(
         "attenuated": (over_time, series("attenuated"), "cost"),
         "bellman_error": (over_learning, series("bellman_error"), "cost/s"),
         "sample_error": (over_learning, series("sample_error"), "1"),
-        "rank_margin": (over_learning, series("rank_margin"), "1"),
         "projecting": (over_learning, series("projecting").astype(np.int8), "1"),
         "predicted_cost": (over_learning, series("predicted_cost"), "cost"),
         "accepted": (over_learning, series("accepted"), "1"),
@@ -98,6 +102,22 @@ def _variables(
         "actor_1": (weights, stack("actor_1", m), "cost"),
         "actor_2": (weights, stack("actor_2", m), "cost"),
     }
+
+
+def _looks(looks: list[Look]) -> dict[str, tuple[tuple[str, ...], Array, str]]:
+    """Return dimensions, values and unit of what the monitor saw."""
+    units = {
+        **dict.fromkeys(("rank_margin", "rank_bound", "regressor_normalized", "fixed_error_rms"), "1"),
+        **{"row_margin": "1/s", "regressor": "1/s", "fixed_error_max": "cost/s"},
+    }
+    variables: dict[str, tuple[tuple[str, ...], Array, str]] = {
+        name: (("look_time",), np.array([getattr(look, name) for look in looks], dtype=float), unit)
+        for name, unit in units.items()
+    }
+    for name in ("actor_norm", "actor_distance"):
+        values = np.array([getattr(look, name) for look in looks]).reshape(len(looks), len(PLAYERS))
+        variables[name] = (("look_time", "player"), values, "1")
+    return variables
 
 
 def _with_actuation(record: xr.Dataset, history: History) -> xr.Dataset:

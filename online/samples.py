@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-import scipy.linalg
 
 from ..symbolic import Path
 from ..symbolic.vehicle import Array
@@ -127,22 +126,15 @@ def around(centers: Array, half_widths: Array, spread: float, rng: np.random.Gen
 
 def regressor_spectrum(omega: Array) -> Array:
     """Return the eigenvalues of Σ ω_j ω_j' / p_j of (18), p_j = sqrt(1 + ω_j'ω_j), ascending, (m,)."""
-    return np.asarray(np.linalg.eigvalsh(_regressor_sum(omega)))
+    rows = omega * (1.0 + np.sum(omega * omega, axis=1, keepdims=True)) ** -0.25
+    return np.asarray(np.linalg.eigvalsh(rows.T @ rows))
 
 
 def rank_margin(omega: Array) -> float:
     """Return λ_min(Σ ω_j ω_j' / p_j): (18) holds while it is positive.
 
     `omega`: (N, m) regressors at the samples. Departs from the paper: (18) asks for the rank only; a
-    uniform lower bound (its c) needs the infimum of this over time, so it is followed online.
+    uniform lower bound (its c) needs the infimum of this over time, so `monitor` follows it.
     """
     n_samples, m = omega.shape
-    if n_samples < m:
-        return 0.0
-    least = scipy.linalg.eigvalsh(_regressor_sum(omega), subset_by_index=[0, 0])
-    return float(max(least[0], 0.0))
-
-
-def _regressor_sum(omega: Array) -> Array:
-    normalizer = np.sqrt(1.0 + np.sum(omega * omega, axis=1))
-    return np.asarray((omega / normalizer[:, None]).T @ omega)
+    return 0.0 if n_samples < m else float(max(regressor_spectrum(omega)[0], 0.0))

@@ -172,7 +172,7 @@ class SimulationSettings(Settings):
     tolerance : relative tolerance of the plant's integration
     pitch_limit : the run ends when |pitch| exceeds it [deg]
     chi : the run ends when a state exceeds this multiple of the full envelope's half-width
-    monitor_every : learning steps between two looks at the rank margin
+    monitor_every : learning steps between two looks of the monitor
     seed : of the envelope states that `compare` adds
     plant : the vehicle that is driven, a shipped name or the path of a TOML file; the scenario's own,
         which the controller is made for, when not given

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import casadi
 import pytest
-from stationkeep.online import Learner, load
+from stationkeep.online import Learner, Monitor, load
 from stationkeep.online.plant import HeldPlant
 
 from .commands import COARSE, QUICK, Answer, call, files_in, script, sets
@@ -89,8 +89,8 @@ INTERRUPTIONS = [
     (HeldPlant, "advance", 30),
     (HeldPlant, "rates", 50),
     (Learner, "step", 3),
-    (Learner, "rank_margin", 1),
-    (Learner, "rank_margin", 2),
+    (Monitor, "look", 1),
+    (Monitor, "look", 2),
     (Learner, "policies", 20),
 ]
 

@@ -31,11 +31,14 @@ class Held:
 
 
 def stack(history: History) -> dict[str, Array]:
-    return {
-        name: np.array(value)
+    lists = {
+        name: value
         for name, value in vars(history).items()
-        if isinstance(value, list) and value
+        if isinstance(value, list) and value and name != "looks"
     }
+    seen = [vars(look) for look in history.looks]
+    lists |= {f"look's {name}": [look[name] for look in seen] for name in (seen[0] if seen else ())}
+    return {name: np.array(value) for name, value in lists.items()}
 
 
 def energy(zeta: Array) -> float:
@@ -74,7 +77,7 @@ def test_rank_condition_holds_with_the_bellman_error_at_fixed_samples() -> None:
     history = run(Scenario.load("bluerov2-heavy", settings))
     assert history.stopped is None
     assert history.sample_error[-1] < 0.7 * history.sample_error[0]
-    assert min(margin for margin in history.rank_margin if np.isfinite(margin)) > 0.0
+    assert min(look.rank_margin for look in history.looks) > 0.0
     assert not any(history.projecting)
 
 
@@ -86,7 +89,7 @@ def test_record_is_complete_and_in_step() -> None:
     assert {len(records[name]) for name in every_step} == {N_STEPS + 1}
     np.testing.assert_allclose(records["time"], 0.02 * np.arange(N_STEPS + 1), atol=1e-12)
     np.testing.assert_array_equal(records["zeta"][0], scenario.initial_state)
-    learning = ("learn_time", "bellman_error", "sample_error", "rank_margin", "critic", "actor_1")
+    learning = ("learn_time", "bellman_error", "sample_error", "projecting", "critic", "actor_1")
     assert len({len(records[name]) for name in learning}) == 1
     assert np.all(np.diff(records["cost"]) > 0.0)
     assert np.all(np.diff(records["attenuated"]) > 0.0)
@@ -225,12 +228,10 @@ def test_learned_weights_are_recorded_as_they_become_active() -> None:
     np.testing.assert_array_equal(history.critic[-1], by_hand.learner.critic)
 
 
-def test_rank_margin_is_followed_at_its_own_pace() -> None:
+def test_the_monitor_looks_at_its_own_pace_and_at_the_end() -> None:
     history = run(quick_scenario("simulation.monitor_every=3"))
-    finite = np.isfinite(history.rank_margin)
-    # and always at the end of the run
-    expected = [i % 3 == 0 or i == len(finite) - 1 for i in range(len(finite))]
-    assert finite.tolist() == expected
+    every_third = history.learn_time[:-1:3]
+    assert [look.time for look in history.looks] == [*every_third, history.time[-1]]
 
 
 @pytest.mark.parametrize("kind", ["constant", "current", "waves"])

@@ -38,14 +38,24 @@ def test_dimensions_and_units(dataset: xr.Dataset) -> None:
         "state": 12,
         "force": 6,
         "basis": 78,
+        "look_time": 2,  # at once and the end
+        "player": 2,
     }
     for name, variable in dataset.data_vars.items():
         assert variable.attrs["units"], name
-        assert variable.dims[0] in ("time", "learn_time"), name
+        assert variable.dims[0] in ("time", "learn_time", "look_time"), name
     assert dataset["time"].attrs["units"] == "s"
-    assert dataset["learn_time"].attrs["units"] == "s"
+    assert dataset["learn_time"].attrs["units"] == dataset["look_time"].attrs["units"] == "s"
     assert list(dataset["state"].values[[0, 4, 11]]) == ["x", "theta", "psi_dot"]
     assert list(dataset["force"].values) == ["X", "Y", "Z", "K", "M", "N"]
+
+
+def test_dataset_holds_the_looks(dataset: xr.Dataset) -> None:
+    looks = history().looks
+    for name in vars(looks[0]):
+        stored = dataset["look_time" if name == "time" else name]
+        np.testing.assert_array_equal(stored.values, [getattr(look, name) for look in looks])
+    assert list(dataset["player"].values) == ["control", "disturbance"]
 
 
 def test_dataset_holds_the_run(dataset: xr.Dataset) -> None:
@@ -271,7 +281,7 @@ def test_a_run_goes_on_from_a_record(dataset: xr.Dataset, tmp_path: Path) -> Non
 
 def test_weights_of_another_basis_are_refused(tmp_path: Path, one_sentence: Check) -> None:
     other = History(learn_time=[0.0], critic=[np.ones(5)], actor_1=[np.ones(5)], actor_2=[np.ones(5)])
-    other.bellman_error, other.sample_error, other.rank_margin = [0.0], [0.0], [0.0]
+    other.bellman_error, other.sample_error = [0.0], [0.0]
     other.projecting, other.fallback = [False], [False]
     other.predicted_cost, other.accepted = [1.0], [1.0]
     path = save(to_dataset(other, {}), tmp_path / "other.nc")

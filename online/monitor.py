@@ -1,0 +1,103 @@
+"""What the proof asks of a learning run, looked at while it runs.
+
+(18) is about the regressors ω_j at fixed points ζ_j and the actor weights of the moment, whatever rows
+the critic learns from: c_lower = λ_min(Σ ω_j ω_j' / p_j), p_j = sqrt(1 + ω_j'ω_j). It moves with the
+actors, so a uniform bound is its infimum over the run. Beside it stands the margin of what the critic
+does learn from, its rows with the leash.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..symbolic.vehicle import Array
+from .bellman import BellmanTerms, Residual, bellman_error
+from .learner import Learner, LearnerStep
+from .samples import regressor_spectrum
+
+
+@dataclass(frozen=True)
+class Look:
+    """What one look shows, under the weights that the learning step saw.
+
+    Attributes
+    ----------
+    time : [s]
+    rank_margin, rank_bound : c_lower and c_upper, least and largest eigenvalue of (18)'s sum [-]
+    row_margin : λ_min(η_c Σ w ω ω' + leash) of the critic's own rows, its slowest rate [1/s]
+    regressor, regressor_normalized : largest |ω_j| [1/s] and |ω_j| / p_j [-] over the fixed points
+    fixed_error_rms, fixed_error_max : rms of δ_j / ζ_j'Qζ_j [-] and largest |δ_j| [cost/s] there
+    actor_norm : (2,) |Ŵ_a1| and |Ŵ_a2| as parts of the projection's bound; it acts above 1
+    actor_distance : (2,) |Ŵ_c - Ŵ_a1| and |Ŵ_c - Ŵ_a2| over |Ŵ_c|
+    """
+
+    time: float
+    rank_margin: float
+    rank_bound: float
+    row_margin: float
+    regressor: float
+    regressor_normalized: float
+    fixed_error_rms: float
+    fixed_error_max: float
+    actor_norm: Array
+    actor_distance: Array
+
+
+class Monitor:
+    """Look at a learner.
+
+    Parameters
+    ----------
+    learner : whose game, functions and projection bound are used; it is not changed
+    points : (N, n) fixed ζ_j of (18); N may be 0, which leaves (18) no rank
+    """
+
+    def __init__(self, learner: Learner, points: Array) -> None:
+        self._learner = learner
+        self._points = points
+        self._terms: BellmanTerms | None = None
+
+    def look(self, time: float, seen: LearnerStep) -> Look:
+        """Return what the weights of a learning step at `time` [s] look like."""
+        actors = np.array([seen.actor_1, seen.actor_2])
+        norm = np.linalg.norm(seen.critic)
+        return Look(
+            time=time,
+            row_margin=float(max(np.linalg.eigvalsh(seen.rows.matrix)[0], 0.0)),
+            actor_norm=np.linalg.norm(actors, axis=1) / self._learner.projection.bound,
+            actor_distance=np.linalg.norm(seen.critic - actors, axis=1) / norm,
+            **self._at_points(seen),
+        )
+
+    def _at_points(self, seen: LearnerStep) -> dict[str, float]:
+        if not len(self._points):
+            return {"rank_margin": 0.0, "rank_bound": 0.0} | dict.fromkeys(_ERRORS, np.nan)
+        residual = self._residual(seen)
+        spectrum = regressor_spectrum(residual.omega)
+        size = float(np.linalg.norm(residual.omega, axis=1).max())
+        relative = residual.delta / self._point_terms().state_cost
+        few = len(self._points) < residual.omega.shape[1]
+        return {
+            "rank_margin": 0.0 if few else float(max(spectrum[0], 0.0)),
+            "rank_bound": float(spectrum[-1]),
+            "regressor": size,
+            "regressor_normalized": size / float(np.sqrt(1.0 + size**2)),
+            "fixed_error_rms": float(np.sqrt(np.mean(relative**2))),
+            "fixed_error_max": float(np.abs(residual.delta).max()),
+        }
+
+    def _residual(self, seen: LearnerStep) -> Residual:
+        weights = (seen.critic, seen.actor_1, seen.actor_2)
+        return bellman_error(self._point_terms(), self._learner.game, *weights)
+
+    def _point_terms(self) -> BellmanTerms:
+        """Return what the points alone decide, evaluated at the first look."""
+        if self._terms is None:
+            found = self._learner.functions.at(self._points)
+            self._terms = BellmanTerms.at(self._points, found, self._learner.game)
+        return self._terms
+
+
+_ERRORS = ("regressor", "regressor_normalized", "fixed_error_rms", "fixed_error_max")
