@@ -119,12 +119,7 @@ def parser() -> argparse.ArgumentParser:
         if name == "offline":
             _offline_options(command)
         if name == "check":
-            command.add_argument(
-                "--ideal-weights",
-                type=Path,
-                metavar="FILE",
-                help="ideal-weights.nc of 'offline --ideal-weights', for what needs ε and ε'",
-            )
+            _check_options(command)
         if name == "compare":
             _compare_options(command)
     return top
@@ -153,6 +148,21 @@ def _workers_option(command: argparse.ArgumentParser) -> None:
         type=int,
         metavar="N",
         help="processes that work at the same time (default: as many as there are cores)",
+    )
+
+
+def _check_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--ideal-weights",
+        type=Path,
+        metavar="FILE",
+        help="ideal-weights.nc of 'offline --ideal-weights', for what needs ε and ε'",
+    )
+    command.add_argument(
+        "--run",
+        type=Path,
+        metavar="FILE",
+        help="learned.nc of 'online' or 'compare': check that run, with its own scenario",
     )
 
 

@@ -62,7 +62,7 @@ def _margin(record: xr.Dataset, station: StationKeeping) -> float | None:
 
 def _monitored(record: xr.Dataset) -> dict[str, float | None]:
     """Return the worst that the monitor saw over the run, each None if it saw nothing."""
-    least = ("rank_margin", "row_margin")
+    least = ("rank_margin", "row_margin", "row_rank")
     largest = ("regressor", "fixed_error_max", "actor_norm", "actor_distance")
     answer: dict[str, float | None] = dict.fromkeys((*least, *largest))
     if record.sizes["look_time"]:
@@ -81,9 +81,10 @@ def _print(answer: dict[str, Any], mode: str) -> None:
     rows = [
         ["cost (with ζ'P ζ for the rest)", _form(answer["cost"], ".4f")],
         ["Bellman error at the state [cost/s]", _form(answer["bellman_error"], ".2e")],
-        ["Bellman error at the samples, rms, relative", _form(answer["sample_error"], ".3f")],
+        ["error that is learned from, rms, relative", _form(answer["sample_error"], ".3f")],
         ["rank margin of (18) at the fixed samples, least", _form(answer["rank_margin"], ".2e")],
-        ["margin of the critic's own rows and leash, least [1/s]", _form(answer["row_margin"], ".2e")],
+        ["margin of the critic's own rows and leash, least", _form(answer["row_margin"], ".2e")],
+        ["directions that these rows decide, fewest", _form(answer["row_rank"], ".0f")],
         ["largest regressor |ω| at the fixed samples [1/s]", _form(answer["regressor"], ".3g")],
         ["largest actor, part of the projection's bound", _form(answer["actor_norm"], ".3f")],
         ["simulated time over wall time", _form(answer["real_time_factor"], ".1f")],

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..offline import Pairs, fit_weights
+from ..offline import Pairs, error_sizes, fit_weights
 from ..offline.ideal_weights import least_states
 from ..online.bellman import BellmanTerms, bellman_error
 from ..online.closed_loop import STATE_NAMES
 from ..symbolic import InputError, RunError, StationKeeping
 from ..symbolic.errors import nearest
 from ..symbolic.vehicle import Array
-from .ideal import TRAINING, envelope_states
+from .ideal import TRAINING, Bounds, Ideal, envelope_states
 from .metrics import GameValue
 from .policies import LinearPolicy
 from .runs import provenance, reused
@@ -75,24 +75,55 @@ def _analysis(
     station = scenario.station_keeping()
     value = GameValue(station)
     parts = [_along(station, learned, value), _around(station, learned, field)]
-    ideal = ideal_weights(station, value, scenario.samples.seed)
-    parts.append(xr.Dataset({"ideal_weights": ("basis", ideal, {"units": "cost"})}))
+    pairs = optimal_pairs(station, value, N_FIT, scenario.samples.seed)
+    parts.append(_ideal(station, pairs))
     merged = xr.merge(parts, combine_attrs="no_conflicts")
     return merged.assign_attrs(attributes)
 
 
-def ideal_weights(station: StationKeeping, value: GameValue, seed: int) -> Array:
-    """Return W*, the fit of the basis to optima of the envelope, (m,); NaN if too few are found."""
-    n_states = max(N_FIT, least_states(station.basis))
-    states = envelope_states(station.envelope, n_states, seed, TRAINING)
+def optimal_pairs(
+    station: StationKeeping, value: GameValue, n_states: int, seed: int, stream: int = TRAINING
+) -> Pairs:
+    """Return V* and its gradient at seeded states of the envelope, those where an optimum is found."""
     found = []
-    for state in states:
+    for state in envelope_states(station.envelope, n_states, seed, stream):
         with suppress(RunError):
             found.append((state, *value.with_costate(state)))
-    if len(found) < least_states(station.basis):
-        return np.full(station.basis.n_basis, np.nan)
+    if not found:
+        return Pairs(np.zeros((0, 12)), np.zeros(0), np.zeros((0, 12)))
     kept, values, gradients = (np.array(part) for part in zip(*found, strict=True))
-    return fit_weights(station.basis, Pairs(kept, values, gradients)).weights
+    return Pairs(kept, values, gradients)
+
+
+def _ideal(station: StationKeeping, pairs: Pairs) -> xr.Dataset:
+    """Return W*, the fit of the basis to optima of the envelope, and these; NaN if they are too few."""
+    enough = len(pairs.values) >= least_states(station.basis)
+    weights = np.full(station.basis.n_basis, np.nan)
+    if enough:
+        weights = fit_weights(station.basis, pairs).weights
+    return xr.Dataset(
+        {
+            "ideal_weights": ("basis", weights, {"units": "cost"}),
+            "optimum_zeta": (("optimum", "state"), pairs.states, {"units": "m, rad, m/s, rad/s"}),
+            "optimum_value": ("optimum", pairs.values, {"units": "cost"}),
+            "optimum_costate": (
+                ("optimum", "state"),
+                pairs.gradients,
+                {"units": "cost per unit of the state"},
+            ),
+        }
+    )
+
+
+def ideal_of(station: StationKeeping, analysis: xr.Dataset) -> Ideal | None:
+    """Return the ideal weights of an analysis, with ε and ε' at the states of the fit; None if NaN."""
+    weights = analysis["ideal_weights"].values
+    if not np.all(np.isfinite(weights)):
+        return None
+    names = ("optimum_zeta", "optimum_value", "optimum_costate")
+    pairs = Pairs(*(analysis[name].values for name in names))
+    epsilon, epsilon_prime = error_sizes(station.basis, weights, pairs)
+    return Ideal(weights, pairs, Bounds(epsilon.sup, epsilon_prime.sup, len(pairs.values)))
 
 
 def weights_in_use(learned: xr.Dataset, name: str, times: Array) -> Array:

@@ -13,14 +13,17 @@ import xarray as xr
 from ..offline import OfflineSolver
 from ..online import draw_samples, load
 from ..symbolic import RunError, StationKeeping
-from .analysis import Field, analysis_record
+from .analysis import Field, analysis_record, ideal_of
 from .conditions import Condition, check
 from .contenders import CONTENDERS
 from .excitation import ExcitationRun, excitation_runs
+from .ideal import Ideal
 from .metrics import GameValue, RunMetrics, dissipation_margin, distribution, run_metrics
 from .pool import Work, run_tasks
+from .run_conditions import run_conditions
 from .runs import contender_record, optimal_record
 from .scenario import Scenario
+from .theory import Theory, theory
 
 Tell = Callable[[str, float], None]
 
@@ -80,7 +83,8 @@ class Comparison:
     margins : of each record from the scenario's state, in `disturbed` mode: the dissipation margin
     analysis : errors along and around the learned run, ideal weights; see `analysis_record`
     excitation : runs without and with samples
-    conditions : the paper's assumptions and conditions
+    conditions : the paper's assumptions and conditions, and what the learned run made of them
+    theory : the theorem along the learned run, None without ideal weights
     """
 
     scenario: Scenario
@@ -93,6 +97,7 @@ class Comparison:
     analysis: xr.Dataset
     excitation: dict[str, list[ExcitationRun]]
     conditions: list[Condition]
+    theory: Theory | None
 
     @property
     def metrics(self) -> dict[str, RunMetrics]:
@@ -177,6 +182,8 @@ def compare(plan: Plan, folder: Path, *, n_workers: int = 1, tell: Tell | None =
     records = {name: load(_path(folder, 0, name)) for name in POLICIES}
     told("errors along the way", 0.0)
     analysis = analysis_record(scenario, records["learned"], plan.field, folder / "analysis.nc")
+    ideal = ideal_of(station, analysis)
+    watched = None if ideal is None else theory(scenario, records["learned"], ideal)
     told("runs without and with samples", 0.0)
     return Comparison(
         scenario=scenario,
@@ -188,8 +195,17 @@ def compare(plan: Plan, folder: Path, *, n_workers: int = 1, tell: Tell | None =
         margins=_margins(station, records) if scenario.simulation.mode == "disturbed" else {},
         analysis=analysis,
         excitation=excitation_runs(scenario),
-        conditions=check(scenario),
+        conditions=_conditions(scenario, records["learned"], ideal, watched),
+        theory=watched,
     )
+
+
+def _conditions(
+    scenario: Scenario, learned: xr.Dataset, ideal: Ideal | None, watched: Theory | None
+) -> list[Condition]:
+    bounds = None if ideal is None else ideal.bounds
+    listed = check(scenario, bounds, float(learned["rank_margin"].min()))
+    return listed + run_conditions(scenario, learned, watched)
 
 
 @dataclass(frozen=True)

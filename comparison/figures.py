@@ -12,6 +12,7 @@ from scipy.optimize import linprog
 from ..symbolic import RunError, StationKeeping, Thrusters
 from .compare import Comparison
 from .learning_figures import draw_bellman, draw_errors, draw_excitation, draw_field, draw_weights
+from .monitor_figure import draw_monitor
 from .path_figure import draw_path
 from .style import LEARNED, OPTIMAL, Page, legend_above, legend_below, line_color, time_axis
 from .verdict_figures import draw_cost, draw_energy, draw_regrets
@@ -54,6 +55,7 @@ def draw_all(comparison: Comparison, page: Page) -> None:
     draw_errors(page, comparison.analysis)
     draw_weights(page, learned, station.riccati_weights, comparison.analysis)
     draw_bellman(page, learned, comparison.scenario.learner.error)
+    draw_monitor(page, learned, comparison.theory)
     draw_field(page, comparison.analysis)
     draw_excitation(page, comparison.excitation)
     draw_states(page, learned, optimal, rates=True)

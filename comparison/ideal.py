@@ -23,6 +23,7 @@ KIND = "ideal weights"
 IDEAL_KEY = OFFLINE_KEY | {"basis"}
 SIZES = ("epsilon", "epsilon_prime", "policy")
 TRAINING, HELD_OUT = 0, 1
+_PAIRS = ("zeta", "value", "costate", "held_out_zeta", "held_out_value", "held_out_costate")
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,24 @@ class Bounds:
     n_states: int
 
 
-def load_bounds(scenario: Scenario, path: Path) -> Bounds:
-    """Return sup|ε| and sup|ε'| from a file of ideal weights.
+@dataclass(frozen=True)
+class Ideal:
+    """What a file of ideal weights holds.
+
+    Attributes
+    ----------
+    weights : (m,) W*
+    pairs : every certified state, fitted to or held out, with its value and gradient
+    bounds : on ε and ε', over the held-out ones
+    """
+
+    weights: Array
+    pairs: Pairs
+    bounds: Bounds
+
+
+def load_ideal(scenario: Scenario, path: Path) -> Ideal:
+    """Return ideal weights from their file.
 
     Raises
     ------
@@ -68,7 +85,7 @@ def load_bounds(scenario: Scenario, path: Path) -> Bounds:
         If it is none, or of another vehicle, game, envelope, basis or offline solver.
     """
     try:
-        attributes, parts = read_parts(path, "epsilon")
+        attributes, parts = read_parts(path, "ideal_weights", "epsilon", *_PAIRS)
         epsilon, epsilon_prime = attributes["epsilon_sup"], attributes["epsilon_prime_sup"]
     except (InputError, KeyError):
         raise InputError(
@@ -79,7 +96,12 @@ def load_bounds(scenario: Scenario, path: Path) -> Bounds:
             f"the ideal weights of '{path}' belong to another vehicle, game, envelope, basis or "
             "[offline]; make them again with 'stationkeep offline --ideal-weights N'"
         )
-    return Bounds(float(epsilon), float(epsilon_prime), len(parts["epsilon"]))
+    states, values, gradients = (
+        np.concatenate([parts[name], parts[f"held_out_{name}"]])
+        for name in ("zeta", "value", "costate")
+    )
+    bounds = Bounds(float(epsilon), float(epsilon_prime), len(parts["epsilon"]))
+    return Ideal(parts["ideal_weights"], Pairs(states, values, gradients), bounds)
 
 
 def envelope_states(envelope: Array, n_states: int, seed: int, stream: int) -> Array:

@@ -44,11 +44,13 @@ def row_weights(kind: Normalizer, omega: Array, state_cost: Array, floor: float)
 class NormalEquations:
     """η_c Σ w ω ω' (m, m) and η_c Σ w ω δ at the present Ŵ_c (m,): all that either law needs.
 
-    The gains η_c are in the row weights: state and samples may have different ones.
+    The gains η_c are in the row weights: state and samples may have different ones. The leash, ρ (m,),
+    is in both.
     """
 
     matrix: Array
     gradient: Array
+    leash: Array
 
     @classmethod
     def of(
@@ -66,7 +68,7 @@ class NormalEquations:
         matrix = weighted.T @ omega
         gradient = weighted.T @ delta
         matrix[np.diag_indices_from(matrix)] += leash
-        return cls(matrix, gradient + leash * offset)
+        return cls(matrix, gradient + leash * offset, leash)
 
 
 def gradient_step(critic: Array, rows: NormalEquations, dt: float) -> Array:

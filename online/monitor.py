@@ -2,8 +2,8 @@
 
 (18) is about the regressors ω_j at fixed points ζ_j and the actor weights of the moment, whatever rows
 the critic learns from: c_lower = λ_min(Σ ω_j ω_j' / p_j), p_j = sqrt(1 + ω_j'ω_j). It moves with the
-actors, so a uniform bound is its infimum over the run. Beside it stands the margin of what the critic
-does learn from, its rows with the leash.
+actors, so a uniform bound is its infimum over the run. Beside it stands what the critic does learn
+from, M = η_c Σ w ω ω' + diag(ρ), its rows and the leash, each weight in its own scale S = diag(M)^-1/2.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from ..symbolic.vehicle import Array
 from .bellman import BellmanTerms, Residual, bellman_error
+from .critic import NormalEquations
 from .learner import Learner, LearnerStep
 from .samples import regressor_spectrum
 
@@ -26,7 +27,8 @@ class Look:
     ----------
     time : [s]
     rank_margin, rank_bound : c_lower and c_upper, least and largest eigenvalue of (18)'s sum [-]
-    row_margin : λ_min(η_c Σ w ω ω' + leash) of the critic's own rows, its slowest rate [1/s]
+    row_margin : λ_min(S M S) of the critic's own rows and leash, 1 where no two weights compete [-]
+    row_rank : directions of the m in which the rows say more than the leash
     regressor, regressor_normalized : largest |ω_j| [1/s] and |ω_j| / p_j [-] over the fixed points
     fixed_error_rms, fixed_error_max : rms of δ_j / ζ_j'Qζ_j [-] and largest |δ_j| [cost/s] there
     actor_norm : (2,) |Ŵ_a1| and |Ŵ_a2| as parts of the projection's bound; it acts above 1
@@ -37,6 +39,7 @@ class Look:
     rank_margin: float
     rank_bound: float
     row_margin: float
+    row_rank: int
     regressor: float
     regressor_normalized: float
     fixed_error_rms: float
@@ -65,7 +68,8 @@ class Monitor:
         norm = np.linalg.norm(seen.critic)
         return Look(
             time=time,
-            row_margin=float(max(np.linalg.eigvalsh(seen.rows.matrix)[0], 0.0)),
+            row_margin=row_margin(seen.rows),
+            row_rank=row_rank(seen.rows),
             actor_norm=np.linalg.norm(actors, axis=1) / self._learner.projection.bound,
             actor_distance=np.linalg.norm(seen.critic - actors, axis=1) / norm,
             **self._at_points(seen),
@@ -98,6 +102,24 @@ class Monitor:
             found = self._learner.functions.at(self._points)
             self._terms = BellmanTerms.at(self._points, found, self._learner.game)
         return self._terms
+
+
+def row_margin(rows: NormalEquations) -> float:
+    """Return λ_min(S M S); at least l/(1+l) where the leash is the part l of each weight's rows."""
+    return float(max(np.linalg.eigvalsh(_scaled(rows, rows.matrix))[0], 0.0))
+
+
+def row_rank(rows: NormalEquations) -> int:
+    """Return in how many directions v' Σ η w ω ω' v > v'diag(ρ) v, by the inertia of M - 2 diag(ρ)."""
+    excess = np.linalg.eigvalsh(_scaled(rows, rows.matrix - 2.0 * np.diag(rows.leash)))
+    return int(np.sum(excess > len(excess) * np.finfo(float).eps * max(excess[-1], 1.0)))
+
+
+def _scaled(rows: NormalEquations, matrix: Array) -> Array:
+    """Return S `matrix` S; a weight that no row says anything about stays zero."""
+    diagonal = np.diag(rows.matrix)
+    scale = np.where(diagonal > 0.0, diagonal, np.inf) ** -0.5
+    return np.asarray(scale[:, None] * matrix * scale)
 
 
 _ERRORS = ("regressor", "regressor_normalized", "fixed_error_rms", "fixed_error_max")

@@ -107,8 +107,9 @@ def _variables(
 def _looks(looks: list[Look]) -> dict[str, tuple[tuple[str, ...], Array, str]]:
     """Return dimensions, values and unit of what the monitor saw."""
     units = {
-        **dict.fromkeys(("rank_margin", "rank_bound", "regressor_normalized", "fixed_error_rms"), "1"),
-        **{"row_margin": "1/s", "regressor": "1/s", "fixed_error_max": "cost/s"},
+        **dict.fromkeys(("rank_margin", "rank_bound", "row_margin", "row_rank"), "1"),
+        **dict.fromkeys(("regressor_normalized", "fixed_error_rms"), "1"),
+        **{"regressor": "1/s", "fixed_error_max": "cost/s"},
     }
     variables: dict[str, tuple[tuple[str, ...], Array, str]] = {
         name: (("look_time",), np.array([getattr(look, name) for look in looks], dtype=float), unit)

@@ -17,7 +17,7 @@ from .commands import COARSE, QUICK, Answer, call, files_in, run, sets
 SMALL = sets(*QUICK, *COARSE)
 FIGURES = {
     *("states", "rates", "cost", "forces_body", "forces_earth", "thrusters", "weights"),
-    *("bellman", "excitation", "regret", "energy", "path", "errors", "field"),
+    *("bellman", "monitor", "excitation", "regret", "energy", "path", "errors", "field"),
 }
 POLICIES = {"learned", "linear", "lqr", "pid", "mpc", "quadratic", "gradient"}
 RECORDS = POLICIES | {"optimal", "analysis"}

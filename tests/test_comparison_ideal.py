@@ -19,7 +19,7 @@ from stationkeep.comparison.ideal import (
     envelope_states,
     fit,
     ideal_record,
-    load_bounds,
+    load_ideal,
 )
 from stationkeep.comparison.optima import Optima
 from stationkeep.offline import Pairs
@@ -168,19 +168,21 @@ def test_another_basis_refuses_the_file(file: Path, one_sentence: Check) -> None
 
 
 def test_bounds(file: Path) -> None:
-    bounds = load_bounds(quick_scenario(), file)
+    bounds = load_ideal(quick_scenario(), file).bounds
     record = load(file)
     assert bounds.epsilon == pytest.approx(np.abs(record["epsilon"].values).max())
     norms = np.linalg.norm(record["epsilon_prime"].values, axis=1)
     assert bounds.epsilon_prime == pytest.approx(norms.max())
     assert bounds.n_states == 20
-    assert load_bounds(quick_scenario("learner.rule='gradient'", "samples.seed=4"), file) == bounds
+    assert (
+        load_ideal(quick_scenario("learner.rule='gradient'", "samples.seed=4"), file).bounds == bounds
+    )
 
 
 @pytest.mark.parametrize("override", ["game.gamma=3", "envelope.scale=0.5", "basis.name=drag"])
 def test_bounds_of_another_scenario_are_refused(override: str, file: Path, one_sentence: Check) -> None:
     with pytest.raises(InputError, match="belong to another") as caught:
-        load_bounds(quick_scenario(override), file)
+        load_ideal(quick_scenario(override), file)
     one_sentence(caught.value)
 
 
@@ -188,7 +190,7 @@ def test_bounds_of_what_is_no_such_file(tmp_path: Path, one_sentence: Check) -> 
     (tmp_path / "noise.nc").write_bytes(b"noise")
     for name in ("none.nc", "noise.nc"):
         with pytest.raises(InputError, match=name) as caught:
-            load_bounds(quick_scenario(), tmp_path / name)
+            load_ideal(quick_scenario(), tmp_path / name)
         assert "--ideal-weights" in one_sentence(caught.value)
 
 

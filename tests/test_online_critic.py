@@ -30,7 +30,7 @@ def equations(rows: tuple[Array, Array, Array], critic: Array) -> NormalEquation
 
 def nothing() -> NormalEquations:
     """Rows that say nothing."""
-    return NormalEquations(np.zeros((M, M)), np.zeros(M))
+    return NormalEquations(np.zeros((M, M)), np.zeros(M), np.zeros(M))
 
 
 @pytest.mark.parametrize("dt", [1e-4, 0.1, 10.0])

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 from stationkeep.online import Learner, LearnerSettings, Look, Monitor, draw_samples, run
 from stationkeep.online.closed_loop import History
 from stationkeep.online.controller import Controller, fixed_points
+from stationkeep.online.critic import NormalEquations
+from stationkeep.online.monitor import row_margin, row_rank
 
 from .games import TWO_STATE_WEIGHTS, Array, quick_scenario, two_state
 
@@ -74,7 +77,26 @@ def test_the_margin_of_the_rows_is_with_the_state_and_the_leash() -> None:
     rate = np.array([-x + y, -x / 2 - slope - 0.375 * c**2 * (push.T @ START)[1]])
     rows = np.vstack([omega, push @ rate])
     gram = sum(2.0 * np.outer(row, row) / np.sqrt(1.0 + row @ row) for row in rows)
-    assert look.row_margin == pytest.approx(np.linalg.eigvalsh(gram + leash)[0], rel=1e-9)
+    total = gram + leash
+    scaled = total / np.sqrt(np.outer(np.diag(total), np.diag(total)))
+    assert look.row_margin == pytest.approx(np.linalg.eigvalsh(scaled)[0], rel=1e-9)
+    assert look.row_rank == np.sum(scipy.linalg.eigvalsh(gram, leash) > 1.0) == 3
+
+
+@pytest.mark.parametrize("part", [1e-3, 0.2])
+def test_the_leash_decides_what_the_rows_leave(part: float) -> None:
+    """Two rows in six dimensions, a leash of a part of each diagonal entry: it carries the rest."""
+    rng = np.random.default_rng(3)
+    omega = rng.standard_normal((2, 6)) * 10.0 ** np.arange(6)
+    leash = part * np.sum(omega**2, axis=0)
+    rows = NormalEquations.of(omega, np.zeros(2), np.ones(2), leash, np.zeros(6))
+    assert row_margin(rows) == pytest.approx(part / (1.0 + part), rel=1e-6)
+    assert row_rank(rows) == 2
+    without = NormalEquations.of(omega, np.zeros(2), np.ones(2), np.zeros(6), np.zeros(6))
+    assert row_margin(without) < 1e-12
+    assert row_rank(without) == 2
+    nothing = NormalEquations.of(omega[:0], np.zeros(0), np.ones(0), np.zeros(6), np.zeros(6))
+    assert (row_margin(nothing), row_rank(nothing)) == (0.0, 0)
 
 
 def test_it_follows_the_actors() -> None:
