@@ -127,6 +127,17 @@ def test_fewer_points_than_weights_have_no_margin() -> None:
     assert look.rank_margin == 0.0 < look.rank_bound
 
 
+def test_weights_that_are_not_finite_are_looked_at_all_the_same() -> None:
+    problem, basis, functions = two_state()
+    learner = Learner(
+        problem, basis, LearnerSettings(leash=0.1), POINTS, TWO_STATE_WEIGHTS, START, functions
+    )
+    learner.actor_1 = learner.actor_1 * np.nan
+    look = Monitor(learner, POINTS).look(0.0, learner.observe(np.array([0.4, -0.3])))
+    assert np.isnan([look.rank_margin, look.regressor, look.row_margin]).all()
+    assert look.row_rank == 0
+
+
 def test_looking_changes_nothing() -> None:
     settings = LearnerSettings(rule="least_squares")
     problem, basis, functions = two_state()
