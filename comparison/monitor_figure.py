@@ -28,6 +28,7 @@ def draw_monitor(page: Page, learned: xr.Dataset, found: Theory | None) -> None:
             projection, time, learned["actor_norm"].values, "|Ŵ_a| / bound (projection acts above 1)"
         )
         projection.axhline(1.0, color="black", lw=1.0, ls=":")
+        projection.set_ylim(0.0, 1.15 * max(1.0, float(learned["actor_norm"].max())))
         _players(apart, time, 100.0 * learned["actor_distance"].values, "critic to actor, % of |Ŵ_c|")
         projection.legend(fontsize=7)
         if found is None:

@@ -50,8 +50,9 @@ CAPTIONS = {
     "whole envelope; the learner fits the way that the vehicle is on, so it need not end there.",
     "bellman": "The error that is learned from, and the Bellman error at the state.",
     "monitor": "What the proof asks for along the learned run: (18) at fixed samples under the policy "
-    "of the moment; in how many directions what is learned from outweighs the leash; the regressors; the "
-    "bound on the weights; how far the policies are from the value; and the proof's V_L.",
+    "of the moment; in how many directions what is learned from outweighs the leash; the "
+    "regressors; the bound on the weights; how far the policies are from the value; and the "
+    "proof's V_L.",
     "field": "How well the equation of the optimum (HJI) is met around the vehicle (dot), over two of "
     "its twelve states; the line is its way.",
     "excitation": "The paper's claim: with sample points the weights converge although the way excites "

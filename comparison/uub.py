@@ -96,7 +96,8 @@ class Constants:
 
     Attributes
     ----------
-    free : e, which the proof leaves free; the geometric mean of what (24) and (25) admit
+    free : e, which the proof leaves free; the geometric mean of what (24) and (25) admit, and the
+        largest that (24) does where no e satisfies (25)
     phi_zeta, phi_c, phi_a1, phi_a2 : φ; the theorem needs all of them positive
     kappa_c : of the module's docstring
     alpha_5 : min(φ_ζ, φ_c/2, φ_a1/2, φ_a2/2)

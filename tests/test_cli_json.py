@@ -91,6 +91,8 @@ def test_online(online: Answer) -> None:
     assert are_numbers(answer["final_state"], 12)
     for key in ("bellman_error", "rank_margin", "cost", "real_time_factor"):
         assert is_number(answer[key]), key
+    for key in ("row_margin", "row_rank", "regressor", "actor_norm", "actor_distance"):
+        assert is_number(answer[key]), key
     assert answer["rank_margin"] > 0.0
     assert answer["real_time_factor"] > 0.0
     assert answer["stopped"] is None
@@ -100,6 +102,8 @@ def test_online_keeps_the_record_that_it_names(online: Answer, folder: Path) -> 
     answer = online.json()
     record = load(folder / answer["record"])
     np.testing.assert_array_equal(record["critic"].values[-1], answer["weights"]["critic"])
+    assert answer["rank_margin"] == record["rank_margin"].values.min()
+    assert answer["regressor"] == record["regressor"].values.max()
     np.testing.assert_array_equal(record["zeta"].values[-1], answer["final_state"])
     assert record["time"].values[-1] == pytest.approx(2.0)
     for variable in record.variables.values():
