@@ -206,9 +206,18 @@ def admissible_gains(found: Suprema, c_lower: float) -> Gains:
     return Gains(critic, 0.25 * critic * c_lower, 0.25 * critic * c_lower)
 
 
-def lyapunov(values: Array, errors: tuple[Array, Array, Array]) -> Array:
-    """Return V_L of (27) from V, (T,), and W̃_c, W̃_a1 and W̃_a2, (T, m) each, shape (T,)."""
-    return np.asarray(values + 0.5 * sum(np.sum(error**2, axis=1) for error in errors))
+def lyapunov(
+    values: Array, errors: tuple[Array, Array, Array], information: Array | None = None
+) -> Array:
+    """Return V_L of (27) from V, (T,), and W̃_c, W̃_a1 and W̃_a2, (T, m) each, shape (T,).
+
+    `information`: Γ^-1 of least squares, (T, m, m), for which |W̃_c|^2 becomes W̃_c'Γ^-1 W̃_c. Without
+    the actors' part that falls at the rate η_c W̃_c'Λ W̃_c + β W̃_c'Γ^-1 W̃_c, halved.
+    """
+    critic, *actors = errors
+    weighted = critic if information is None else np.einsum("tij,tj->ti", information, critic)
+    squares = np.sum(critic * weighted, axis=1) + sum(np.sum(error**2, axis=1) for error in actors)
+    return np.asarray(values + 0.5 * squares)
 
 
 def distance(zeta: Array, errors: tuple[Array, Array, Array]) -> Array:

@@ -30,6 +30,7 @@ class LearnerStep:
         the predicted paths; NaN without samples
     projecting : whether the smooth projection acts on an actor
     rows : what the critic learns from, state, samples and leash
+    information : (m, m) Γ^-1 of least squares before the step
     predicted_cost : J of the policy in use before the actors moved; NaN without safeguard
     accepted : part of the actors' step that was certified; 1 without safeguard
     fallback : whether the policy in use after the step is the linear one, since no other was certified
@@ -42,6 +43,7 @@ class LearnerStep:
     sample_error: float
     projecting: bool
     rows: NormalEquations
+    information: Array
     predicted_cost: float = np.nan
     accepted: float = 1.0
     fallback: bool = False
@@ -156,6 +158,7 @@ class Learner:
             sample_error=np.nan if there is None else there.error,
             projecting=any(self.projection.active(actor) for actor in self._weights[1:]),
             rows=self._rows(terms, here, there),
+            information=self._least_squares.information,
         )
 
     def policies(self, zeta: Array) -> tuple[Array, Array]:

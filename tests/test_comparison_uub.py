@@ -289,6 +289,25 @@ def test_v_l_falls_from_far_outside_the_level_too(start: Array) -> None:
     assert V_L[-1] < 1e-3 * V_L[0]
 
 
+@pytest.mark.parametrize("start", FAR)
+def test_v_l_of_least_squares_falls(start: Array) -> None:
+    """V + W̃_c'Γ^-1 W̃_c/2 + ... along the run of least squares with forgetting."""
+    problem, basis, functions = two_state()
+    settings = LearnerSettings(gain_actor_1=1.0, gain_actor_2=0.8, forgetting=1.0, covariance=10.0)
+    learner = Learner(problem, basis, settings, SAMPLES, TWO_STATE_WEIGHTS, start, functions)
+    run = game_run(learner, np.array([0.7, -0.7]), 4.0, 0.01)
+    errors, value = run.errors(TWO_STATE_WEIGHTS), 0.5 * run.zeta[:, 0] ** 2 + run.zeta[:, 1] ** 2
+    information = np.array([step.information for step in run.steps])
+    V_L = lyapunov(value, errors, information)
+    by_hand = [e @ step.information @ e for e, step in zip(errors[0], run.steps, strict=True)]
+    rest = np.sum(errors[1] ** 2 + errors[2] ** 2, axis=1)
+    np.testing.assert_allclose(V_L, value + 0.5 * (np.array(by_hand) + rest))
+    assert np.linalg.eigvalsh(information[0])[0] == pytest.approx(0.1)
+    assert np.linalg.eigvalsh(information[-1])[0] > 1.0
+    assert np.all(np.diff(V_L) < 0.0)
+    assert V_L[-1] < 1e-2 * V_L[0]
+
+
 def test_v_l_rises_where_the_actors_are_too_fast() -> None:
     """Actors half way between W and a critic that errs where (18) is weakest: V_L_dot > 0 at first.
 
