@@ -41,7 +41,8 @@ def draw_monitor(page: Page, learned: xr.Dataset, found: Theory | None) -> None:
 
 def _line(axes: Axes, time: np.ndarray, values: xr.DataArray, title: str) -> None:
     axes.plot(time, values, color=LEARNED)
-    axes.set_ylim(bottom=0.0, top=1.15 * max(float(values.max()), 1e-12))
+    largest = float(values.max())
+    axes.set_ylim(0.0, 1.15 * largest if 0.0 < largest < np.inf else 1.0)
     axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
     axes.set_title(title)
 

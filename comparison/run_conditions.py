@@ -16,6 +16,8 @@ def run_conditions(
 ) -> list[Condition]:
     """Return what the paper asks of a run, with what it was; the theorem's part needs ideal weights."""
     watched = [*_regressors(record), *_weights(record), _stayed(scenario, record)]
+    # without samples there are no regressors
+    watched = [row for row in watched if row.value is not None and np.isfinite(row.value)]
     return watched if found is None else [*watched, *_theorem(scenario, record, found)]
 
 

@@ -96,8 +96,8 @@ class Constants:
 
     Attributes
     ----------
-    free : e, which the proof leaves free; the geometric mean of what (24) and (25) admit, and the
-        largest that (24) does where no e satisfies (25)
+    free : e, which the proof leaves free; the geometric mean of what (24) and (25) admit, and half of
+        what (24) does where no e satisfies (25)
     phi_zeta, phi_c, phi_a1, phi_a2 : φ; the theorem needs all of them positive
     kappa_c : of the module's docstring
     alpha_5 : min(φ_ζ, φ_c/2, φ_a1/2, φ_a2/2)
@@ -235,6 +235,8 @@ def _at_samples(
     functions: ValueFunctions, weights: Array, samples: Array
 ) -> tuple[tuple[float, float], float]:
     """Return Σ λ_max(G_σij) for both players and Σ |E_j|; E_j is δ_j at the ideal weights."""
+    if not len(samples):
+        return (0.0, 0.0), 0.0
     game = functions.problem.game
     terms = BellmanTerms.at(samples, functions.at(samples), game)
     first, second = (float(largest_square(terms, weight).sum()) for weight in _weights(game))
@@ -247,7 +249,7 @@ def _free(q_lower: float, gained: float, product: float, room: float) -> float:
     if product == 0.0:
         return 1.0
     largest = 2.0 * q_lower / gained
-    return float(np.sqrt(largest * product / (2.0 * room))) if room > 0.0 else largest
+    return float(np.sqrt(largest * product / (2.0 * room))) if room > 0.0 else 0.5 * largest
 
 
 def _part(numerator: float, phi: float, alpha: float) -> float:

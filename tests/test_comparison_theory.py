@@ -12,8 +12,10 @@ import xarray as xr
 from stationkeep.comparison import Condition
 from stationkeep.comparison.analysis import ideal_of
 from stationkeep.comparison.ideal import Bounds, Ideal, fit, ideal_record
+from stationkeep.comparison.monitor_figure import draw_monitor
 from stationkeep.comparison.run_conditions import run_conditions
 from stationkeep.comparison.runs import online_record
+from stationkeep.comparison.style import Page
 from stationkeep.comparison.theory import Theory, require_run, theory
 from stationkeep.offline import Pairs
 from stationkeep.online import save
@@ -154,6 +156,23 @@ def test_lost_rank_admits_no_gains() -> None:
     listed = {c.name: c for c in run_conditions(quick_scenario(*GRADIENT), lost, at)}
     assert listed["c_lower > 0 along the run"].holds is False
     assert "lost its rank" in listed["the same at gains that (24) and (25) admit"].note
+
+
+def test_without_samples_18_has_no_rank_and_the_rest_is_told(tmp_path: Path) -> None:
+    """Costate rows need none: the run learns, and nothing is known of the regressors."""
+    scenario = quick_scenario(
+        *("samples.number=0", "learner.error=costate", "learner.safeguard=true"),
+        "simulation.duration=0.6",
+    )
+    run = online_record(scenario)
+    at = theory(scenario, run, ideal())
+    listed = {c.name: c for c in run_conditions(scenario, run, at)}
+    assert listed["c_lower > 0 along the run"].holds is False
+    assert "|ω / p| <= 1 along the run" not in listed
+    assert "V_L never rises" in listed
+    page = Page(tmp_path)
+    draw_monitor(page, run, None)
+    assert page.files["monitor"].is_file()
 
 
 def test_a_record_without_learning_is_refused(one_sentence: Check) -> None:
