@@ -22,7 +22,7 @@ from ..symbolic.vehicle import Array
 from .contenders import contender
 from .scenario import Scenario
 
-FORMAT = 4  # of the records; raise it when what is in them, or how a run is made, changes
+FORMAT = 5  # of the records; raise it when what is in them, or how a run is made, changes
 OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
 
 
