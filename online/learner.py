@@ -12,7 +12,7 @@ from .actor import Projection, actor_step
 from .bellman import BellmanTerms, Residual, bellman_error
 from .critic import LeastSquares, NormalEquations, gradient_step, row_weights
 from .memory import Memory
-from .rows import BellmanSource, CostateSource, PathRows, RowSource, SampleRows, Weights
+from .rows import BellmanSource, CostateSource, PathRows, RelativeTo, RowSource, SampleRows, Weights
 from .safeguard import Safeguard
 from .samples import FixedSamples, SampleStrategy
 from .settings import LearnerSettings, SampleSettings
@@ -245,11 +245,12 @@ class Learner:
         strategy = FixedSamples(samples) if isinstance(samples, np.ndarray) else samples
         return BellmanSource(strategy, self._terms, self._residual, self._row_weights, self._predict)
 
-    def _path_rows(self, points: int) -> PathRows:
-        return PathRows(self.functions.prediction(self.settings.steps), self._steps, points)
+    def _path_rows(self, points: int, relative_to: RelativeTo = "rest") -> PathRows:
+        prediction = self.functions.prediction(self.settings.steps)
+        return PathRows(prediction, self._steps, points, relative_to)
 
     def _new_memory(self, envelope: Array | None, paths: SampleSettings) -> Memory | None:
         if envelope is None:
             return None
-        path_rows = self._path_rows(paths.path_points)
+        path_rows = self._path_rows(paths.path_points, "whole")
         return Memory(path_rows, self.predicted_cost, envelope, self.reference, seed=paths.seed)

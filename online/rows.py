@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from .bellman import BellmanTerms, Residual
 from .samples import Predict, SampleStrategy, around
 
 VALUE_SHARE = 1e-2  # of a relative square error of the value, beside one of relative regret
+RelativeTo = Literal["rest", "whole"]
 Weights = tuple[Array, Array, Array]  # critic, actor_1, actor_2
 
 
@@ -108,7 +109,15 @@ class PathRows:
     along its own trajectory (completing the square in (7)). V_ζ' is not known, but the gradient λ of
     the present policy's cost J is (`symbolic.prediction`), and going to the policy of λ is a step of
     policy iteration. So the rows are δ = L g'(σ'^T Ŵ_c - λ), k of them a point, weights Δt / J:
-    their sum of squares is the regret relative to what is left to pay, over the paths.
+    their sum of squares is the regret over the paths, relative to what is left to pay at each point
+    (`rest`), or to the whole cost J_0 of each path (`whole`). With the latter, and at Ŵ_c = W, the
+    weights of the policy,
+
+        2 Σ w ω δ = Δt Σ ∂v̂/∂W' (2 R_eff v̂ + g'λ) / J_0 = ∂(ln J_0)/∂W,
+
+    so that fitting the rows is a Gauss-Newton step on the mean of ln J_0 over the starts. The points
+    of `rest` count for the time until the next one, which favours where the vehicle is (with trapezoids
+    the learner does less well); those of `whole` by the trapezoidal rule.
 
     g'σ'^T says nothing of functions of the position alone, which no policy depends on. What they are
     worth comes from rows of the value itself, σ'Ŵ_c - J, relative to J, with a share that is small.
@@ -120,14 +129,19 @@ class PathRows:
     ----------
     prediction, steps : of the paths
     points : of each path that give rows
+    relative_to : what the weights are relative to
     """
 
-    def __init__(self, prediction: Prediction, steps: Array, points: int) -> None:
+    def __init__(
+        self, prediction: Prediction, steps: Array, points: int, relative_to: RelativeTo = "rest"
+    ) -> None:
         self._prediction = prediction
         self._steps = steps
+        self._relative_to = relative_to
         edges = np.unique(np.linspace(0, len(steps), points + 1).astype(int))
         self._nodes = edges[:-1]
-        self._spans = np.diff(np.append(0.0, np.cumsum(steps))[edges])
+        gaps = np.diff(np.append(0.0, np.cumsum(steps))[edges])
+        self._spans = gaps if relative_to == "rest" else _trapezoids(gaps)
 
     def at(self, starts: Array, actor_1: Array, actor_2: Array) -> tuple[Array, Array, Array] | None:
         """Return ω (N, m), targets (N,) and weights (N,) of the paths from the rows of `starts`.
@@ -146,15 +160,25 @@ class PathRows:
         k, m = regressors.shape[1:]
         to_go = np.concatenate([path.cost_to_go[self._nodes] for path in paths])
         # what is left to pay is the difference of two large numbers: no rows where rounding owns it
-        least = 1e-9 * np.repeat([path.cost for path in paths], len(self._nodes))
+        whole = np.repeat([path.cost for path in paths], len(self._nodes))
+        least = 1e-9 * whole
         spans = np.where(to_go > least, np.tile(self._spans, len(paths)), 0.0) / len(paths)
         floored = np.maximum(to_go, least)
+        unit = floored if self._relative_to == "rest" else whole
         value_weights = VALUE_SHARE * spans / (self._spans.sum() * floored**2)
         return (
             np.vstack([regressors.reshape(-1, m), sigma]),
             np.concatenate([targets.reshape(-1), to_go]),
-            np.append(np.repeat(spans / floored, k), value_weights),
+            np.append(np.repeat(spans / unit, k), value_weights),
         )
+
+
+def _trapezoids(gaps: Array) -> Array:
+    """Return the weights of points with these gaps after them; the last has the whole last gap."""
+    spans = gaps / 2.0
+    spans[1:] += gaps[:-1] / 2.0
+    spans[-1] += gaps[-1] / 2.0
+    return np.asarray(spans)
 
 
 class CostateSource:
