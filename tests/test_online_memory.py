@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -119,10 +120,11 @@ def test_frozen_weights_are_far_better_than_linear_in_the_whole_envelope(tmp_pat
         return float(cost / solver.solve(zeta, verify=False).value - 1.0)
 
     (start,) = draw_samples(envelope, 1, 21)
+    started = time.process_time()
     taught = run(
         scenario.with_settings(simulation={"initial_state": start}, samples={"remember": True})
     )
-    assert taught.wall_seconds < 60.0
+    assert time.process_time() - started < 60.0  # faster than real time
     path = save(to_dataset(taught, {}), tmp_path / "run.nc")
     kept = scenario.with_settings(learner={"weights": str(path)})
     states = draw_samples(envelope, 8, 22)
