@@ -9,6 +9,7 @@ from .l2_gain import GainMeter, MeasuredGain
 from .plant import Plant
 from .policy import ControlPolicy, learned_policy, linear_policy
 from .saddle import SaddleSolution, SaddleSolver
+from .schedule import ScheduledWorstCase, WeightSchedule
 from .settings import OfflineSettings
 from .solve import OfflineSolution, OfflineSolver, horizon_of, solve
 from .trajectory import Trajectory
@@ -35,7 +36,9 @@ __all__ = [
     "SaddleGap",
     "SaddleSolution",
     "SaddleSolver",
+    "ScheduledWorstCase",
     "Trajectory",
+    "WeightSchedule",
     "WorstCase",
     "WorstCaseSolver",
     "error_sizes",

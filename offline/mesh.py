@@ -19,13 +19,15 @@ def graded_mesh(horizon: float, n_intervals: int, grading: float) -> Array:
     return np.asarray(horizon * (np.expm1(grading * s) / np.expm1(grading)))
 
 
-def aligned_mesh(mesh: Array, events: Array, *, closest: float = 0.2) -> Array:
+def aligned_mesh(
+    mesh: Array, events: Array, *, closest: float = 0.2, fixed: Array | None = None
+) -> Array:
     """Return the mesh with a point at every event, sorted.
 
-    A mesh point nearer to an event than `closest` times the shorter of its intervals moves onto it;
-    other events split their interval.
+    A mesh point nearer to an event than `closest` times the shorter of its intervals moves onto it,
+    unless it is one of the `fixed`; other events split their interval.
     """
-    points, taken = list(mesh), set[float]()
+    points, taken = list(mesh), set[float]() if fixed is None else set(fixed.tolist())
     for event in np.sort(events):
         i = int(np.argmin(np.abs(np.array(points) - event)))
         neighbours = [abs(points[j] - points[i]) for j in (i - 1, i + 1) if 0 <= j < len(points)]

@@ -32,9 +32,9 @@ def linear_policy(problem: Problem) -> SX:
     return DM(-problem.game.R_inverse @ B.T @ problem.P) @ problem.zeta
 
 
-def learned_policy(problem: Problem, basis: Basis, weights: Array) -> SX:
-    """Return û_1 of (14), -1/2 R^-1 g'σ'Ŵ, for weights (m,), shape (k,)."""
-    value = casadi.dot(DM(weights), basis.sigma)
+def learned_policy(problem: Problem, basis: Basis, weights: Array | SX) -> SX:
+    """Return û_1 of (14), -1/2 R^-1 g'σ'Ŵ, for weights or a symbol of them (m,), shape (k,)."""
+    value = casadi.dot(SX(weights), basis.sigma)
     push = problem.input_matrix.T @ casadi.gradient(value, problem.zeta)
     return -0.5 * DM(problem.game.R_inverse) @ push
 

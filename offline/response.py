@@ -134,9 +134,13 @@ def perturbation(rng: np.random.Generator, unit: Array, *, decay: float = 5.0) -
 
 
 def reintegrate_response(stage: Stage, zeta0: Array, path: Trajectory, parameters: Array) -> Array:
-    """Integrate a stage under the interpolated input of a path, by scipy, with constant parameters.
+    """Integrate a stage under the interpolated input of a path, by scipy.
 
     The integration starts anew at every mesh point: the input is smooth only between them.
+
+    Parameters
+    ----------
+    parameters : (K, q) constant on each interval
 
     Returns
     -------
@@ -150,7 +154,7 @@ def reintegrate_response(stage: Stage, zeta0: Array, path: Trajectory, parameter
     rows = [np.append(zeta0, 0.0)]
     atol = 1e-12 * np.append(np.abs(path.states).max() * np.ones(len(zeta0)), 1.0)
     for i, span in enumerate(pairwise(path.mesh)):
-        rhs = _open_loop(stage, path.input_polynomial(i), parameters)
+        rhs = _open_loop(stage, path.input_polynomial(i), parameters[i])
         rows.append(integrate(rhs, rows[-1], np.array(span), rtol=1e-10, atol=atol)[-1])
     return np.array(rows)
 

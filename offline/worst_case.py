@@ -19,7 +19,6 @@ second-order condition is checked.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,14 +26,13 @@ from casadi import SX
 
 from ..symbolic import RunError, require_state
 from ..symbolic.vehicle import Array
-from .mesh import aligned_mesh, graded_mesh
-from .plant import Plant, Policy
+from .disturber import ByInterval, Disturber
+from .mesh import graded_mesh
 from .policy import ControlPolicy
-from .response import Guess, Responder, Response, Signal, perturbation, reintegrate_response
+from .response import Response
 from .second_order import SecondOrder
 from .stage import against_control
 from .trajectory import Trajectory
-from .verification import sign_changes
 
 
 @dataclass(frozen=True)
@@ -101,23 +99,17 @@ class WorstCaseSolver:
         reach: float = 4.0,
     ) -> None:
         self.policy, self.problem = policy, policy.problem
-        self.starts, self.seed, self.reach = starts, seed, reach
         # the graded mesh of twice the horizon keeps its first intervals with log(2) more grading
         more = np.log(2.0) if grading > 0.0 else 0.0
         self._meshes = (
             graded_mesh(horizon, n_intervals, grading),
             graded_mesh(2.0 * horizon, 2 * n_intervals, grading + more),
         )
-        self._plant = Plant(self.problem)
         self._level = float(self.problem.game.gamma**2)
-        X, n, level = (
-            policy.bounded_real(self.problem.game.gamma),
-            self.problem.n_states,
-            SX.sym("level"),
-        )
-        self._rest = np.zeros((n, n)) if X is None else X
-        self.stage = against_control(self.problem, policy.u_control, level, self._rest, level)
-        self._responder = Responder(self.stage, degree)
+        X, n = policy.bounded_real(self.problem.game.gamma), self.problem.n_states
+        level, rest = SX.sym("level"), np.zeros((n, n)) if X is None else X
+        stage = against_control(self.problem, policy.u_control, level, rest, level)
+        self._disturber = Disturber(self.problem, stage, degree, starts=starts, seed=seed, reach=reach)
 
     def solve(self, zeta0: Array) -> WorstCase:
         """Return the worst case from `zeta0`, or that there is none and why.
@@ -132,8 +124,8 @@ class WorstCaseSolver:
         reason = self.policy.excludes(self.problem.game.gamma)
         if reason is None:
             try:
-                worst = self._measured(zeta0, self._settled(zeta0))
-                return replace(worst, seconds=time.perf_counter() - started)
+                response = self._settled(zeta0)
+                return measured(self._disturber, zeta0, response, _constant(self._level), started)
             except RunError as error:
                 reason = f"the disturbance runs off: {error}"
         return unbounded(zeta0, reason, time.perf_counter() - started)
@@ -155,21 +147,23 @@ class WorstCaseSolver:
         if worst.path is None or worst.disturbance_energy <= 0.0:
             raise RunError("there is no worst-case disturbance whose attenuation could be measured")
         path, level = worst.path, self._level
-        if self._cost(worst.zeta, replace(path, v=np.zeros_like(path.v))) >= bias:
+        undisturbed = replace(path, v=np.zeros_like(path.v))
+        if self._disturber.cost(worst.zeta, undisturbed, _constant(level)) >= bias:
             return np.inf
         energies = worst.output_energy, worst.disturbance_energy
         for _ in range(rounds):
             before, level = level, (energies[0] - bias) / energies[1]
             if abs(level - before) <= 1e-6 * before:  # its convergence is quadratic
                 break
-            response = self._respond(worst.zeta, path.mesh, [path.sample(path.times[1:])], level)
-            path, energies = response.path, self._energies(response, level)
+            guess = path.sample(path.times[1:])
+            response = self._disturber.respond(worst.zeta, path.mesh, [guess], _constant(level))
+            path, energies = response.path, self._disturber.energies(response, level)
         return float(np.sqrt(level))
 
     def _settled(self, zeta0: Array) -> Response:
         """Return the maximum on a horizon that is long enough."""
         short = self._maximise(zeta0, self._meshes[0])
-        if self._tail(short) <= 1e-6:
+        if self._disturber.tail(short) <= 1e-6:
             return short
         response = self._maximise(zeta0, self._meshes[1])
         growth = response.cost / short.cost - 1.0
@@ -177,89 +171,32 @@ class WorstCaseSolver:
             raise RunError(f"the cost grows by a part of {growth:.2g} when the horizon is doubled")
         return response
 
-    def _maximise(self, zeta0: Array, mesh: Array, *, rounds: int = 4) -> Response:
-        """Return the best maximum, on a mesh aligned with the sign changes of the velocities."""
-        response = self._respond(zeta0, mesh, self._guesses(zeta0, mesh), self._level)
-        starts, iterations, known = response.starts, response.iterations, np.empty(0)
-        for _ in range(rounds):
-            events = sign_changes(self._plant, response.path)
-            if len(events) == len(known) and np.abs(events - known).max(initial=0.0) <= 1e-6:
-                break
-            known, points = events, aligned_mesh(mesh, events)
-            guess = response.path.sample(self._responder.times(points))
-            response = self._respond(zeta0, points, [guess], self._level)
-            iterations += response.iterations
-        return replace(response, starts=starts, iterations=iterations)
+    def _maximise(self, zeta0: Array, mesh: Array) -> Response:
+        level = np.array([self._level])
+        guesses = self._disturber.guesses(zeta0, mesh, lambda t: level)
+        return self._disturber.maximise(zeta0, mesh, guesses, _constant(self._level))
 
-    def _respond(self, zeta0: Array, mesh: Array, guesses: Iterable[Guess], level: float) -> Response:
-        """Return the best maximum from the guesses, on this mesh; refuse one that has run off."""
-        points = len(self._responder.times(mesh))
-        response = self._responder.best(zeta0, mesh, guesses, np.full((points, 1), level))
-        reach, first = (
-            float(np.abs(states / self.problem.scale).max()) for states in (response.path.states, zeta0)
-        )
-        if reach > self.reach * max(1.0, first):
-            raise RunError(f"a state reaches {reach:.3g} half-widths of the envelope")
-        return response
 
-    def _guesses(self, zeta0: Array, mesh: Array) -> Iterator[Guess]:
-        """Yield simulations without disturbance, with the linear worst case, and with random ones.
-
-        Raises
-        ------
-        RunError
-            If the policy loses the plant without a disturbance.
-        """
-        game, (_, B) = self.problem.game, self.problem.linearization
-        worst = game.disturbance_inverse @ B.T @ self._rest
-        energy = zeta0 @ self._rest @ zeta0 / (self._level * np.diag(game.W_d))
-        rng = np.random.default_rng(self.seed)
-        pushes = [perturbation(rng, 0.5 * np.sqrt(energy)) for _ in range(self.starts)]
-        yield self._simulated(zeta0, mesh, lambda t, zeta: np.zeros(self.problem.n_inputs))
-        for policy in (lambda t, zeta: worst @ zeta, *(_open_loop(push) for push in pushes)):
-            try:
-                yield self._simulated(zeta0, mesh, policy)
-            except RunError:
-                continue  # pushed too far
-
-    def _simulated(self, zeta0: Array, mesh: Array, policy: Policy) -> Guess:
-        times, level = self._responder.times(mesh), np.array([self._level])
-        return self._responder.rollout(zeta0, times, policy, lambda t: level)
-
-    def _measured(self, zeta0: Array, response: Response) -> WorstCase:
-        path = response.path
-        output, disturbance = self._energies(response, self._level)
-        return WorstCase(
-            zeta=zeta0,
-            unbounded=None,
-            cost=-response.cost,
-            path=path,
-            second_order=response.second_order,
-            reintegrated=self._cost(zeta0, path),
-            reach=float(np.abs(path.states / self.problem.scale).max()),
-            starts=-response.starts,
-            output_energy=output,
-            disturbance_energy=disturbance,
-            iterations=response.iterations,
-            seconds=0.0,
-        )
-
-    def _cost(self, zeta0: Array, path: Trajectory) -> float:
-        """Return the cost when scipy integrates the closed loop under the input of a path."""
-        rows = reintegrate_response(self.stage, zeta0, path, np.array([self._level]))
-        end = rows[-1, :-1]
-        return float(end @ self._rest @ end - rows[-1, -1])
-
-    def _tail(self, response: Response) -> float:
-        """Return the part of the cost that is ζ(T)'X ζ(T)."""
-        end = response.path.states[-1]
-        return float(end @ self._rest @ end) / max(-response.cost, np.finfo(float).tiny)
-
-    def _energies(self, response: Response, level: float) -> tuple[float, float]:
-        """Return ∫ |z|^2 dt with the rest, and ∫ d'W_d d dt."""
-        path, W_d = response.path, self.problem.game.W_d
-        disturbance = float(path.quadrature(np.sum(path.v @ W_d * path.v, axis=1))[-1])
-        return level * disturbance - response.cost, disturbance
+def measured(
+    disturber: Disturber, zeta0: Array, response: Response, parameters: ByInterval, started: float
+) -> WorstCase:
+    """Return what is told of a maximum; `started` is the `perf_counter` before it was looked for."""
+    path, problem = response.path, disturber.problem
+    output, disturbance = disturber.energies(response, float(problem.game.gamma**2))
+    return WorstCase(
+        zeta=zeta0,
+        unbounded=None,
+        cost=-response.cost,
+        path=path,
+        second_order=response.second_order,
+        reintegrated=disturber.cost(zeta0, path, parameters),
+        reach=float(np.abs(path.states / problem.scale).max()),
+        starts=-response.starts,
+        output_energy=output,
+        disturbance_energy=disturbance,
+        iterations=response.iterations,
+        seconds=time.perf_counter() - started,
+    )
 
 
 def unbounded(zeta0: Array, reason: str, seconds: float) -> WorstCase:
@@ -280,5 +217,5 @@ def unbounded(zeta0: Array, reason: str, seconds: float) -> WorstCase:
     )
 
 
-def _open_loop(signal: Signal) -> Policy:
-    return lambda t, zeta: signal(t)
+def _constant(level: float) -> ByInterval:
+    return lambda mesh: np.full((len(mesh) - 1, 1), level)
