@@ -14,7 +14,7 @@ from ..symbolic import InputError, RunError, StationKeeping, Vehicle
 from ..symbolic.vehicle import Array
 from .allocation import Allocator
 from .controller import Controller, ControllerScenario, fixed_points
-from .disturbance import build_disturbance
+from .disturbance import DisturbanceSource, build_disturbance
 from .learner import LearnerStep
 from .monitor import Look, Monitor
 from .noise import MeasurementNoise
@@ -83,7 +83,10 @@ class History:
 
 
 def run(
-    scenario: RunScenario, policy: Policy | None = None, progress: Progress | None = None
+    scenario: RunScenario,
+    policy: Policy | None = None,
+    progress: Progress | None = None,
+    source: DisturbanceSource | None = None,
 ) -> History:
     """Run a scenario in closed loop, with its own controller unless a policy is given.
 
@@ -93,8 +96,11 @@ def run(
     Parameters
     ----------
     progress : called with the simulated time [s] after every control period
+    source : the disturbance d(t); the one of the scenario's settings if None
     """
-    loop = _Loop(scenario, Controller(scenario) if policy is None else policy)
+    if source is None:
+        source = build_disturbance(scenario.simulation.disturbance)
+    loop = _Loop(scenario, Controller(scenario) if policy is None else policy, source)
     started = time.perf_counter()
     try:
         loop.go(progress)
@@ -106,14 +112,13 @@ def run(
 
 
 class _Loop:
-    def __init__(self, scenario: RunScenario, policy: Policy) -> None:
+    def __init__(self, scenario: RunScenario, policy: Policy, source: DisturbanceSource) -> None:
         self.settings = scenario.simulation
         self.station: StationKeeping = scenario.station_keeping()
         self.policy = policy
         self.monitor = None
         if isinstance(policy, Controller):
             self.monitor = Monitor(policy.learner, fixed_points(scenario.samples, self.station))
-        source = build_disturbance(self.settings.disturbance)
         vehicle = scenario.plant_vehicle()
         self.plant = HeldPlant(self.station, source, self.settings.tolerance, vehicle)
         limited = self.settings.thruster_limits
