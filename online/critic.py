@@ -16,12 +16,14 @@ A leash (ridge towards reference weights) is m more rows: ω = e_i, w = ρ_i, δ
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 import scipy.linalg
+from scipy.linalg import lapack
 
 from ..symbolic.vehicle import Array
+from .vector_code import largest_covariance
 
 Normalizer = Literal["paper", "squared", "state_cost"]
 
@@ -38,6 +40,29 @@ def row_weights(kind: Normalizer, omega: Array, state_cost: Array, floor: float)
         return np.asarray((state_cost + floor) ** -2)
     normalizer = 1.0 + np.sum(omega * omega, axis=1)
     return np.asarray(normalizer**-0.5 if kind == "paper" else 1.0 / normalizer)
+
+
+class Equations(Protocol):
+    """What either law needs of the rows."""
+
+    @property
+    def matrix(self) -> Array:
+        """A = η Σ w ω ω' and the leash, shape (m, m)."""
+        ...
+
+    @property
+    def gradient(self) -> Array:
+        """b = η Σ w ω δ and the leash's pull at the present Ŵ_c, shape (m,)."""
+        ...
+
+    @property
+    def leash(self) -> Array:
+        """ρ, the part of the leash in A, shape (m,)."""
+        ...
+
+    def flow(self, dt: float) -> Array:
+        """Return y(dt) of y_dot = -A y + b, y(0) = 0, shape (m,)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -70,18 +95,27 @@ class NormalEquations:
         matrix[np.diag_indices_from(matrix)] += leash
         return cls(matrix, gradient + leash * offset, leash)
 
+    def flow(self, dt: float) -> Array:
+        """Return y(dt) by the eigenvalues."""
+        return exact_flow(self.matrix, self.gradient, dt)
 
-def gradient_step(critic: Array, rows: NormalEquations, dt: float) -> Array:
-    """Return Ŵ_c after dt of (19) with frozen rows, shape (m,).
 
-    Exactly: Ŵ_c - V diag((1 - e^{-λ dt}) / λ) V' η Σ w ω δ with η Σ w ω ω' = V diag(λ) V'.
+def gradient_step(critic: Array, rows: Equations, dt: float) -> Array:
+    """Return Ŵ_c after dt of (19) with frozen rows, shape (m,): Ŵ_c - y(dt) of their flow."""
+    return np.asarray(critic - rows.flow(dt))
+
+
+def exact_flow(matrix: Array, gradient: Array, dt: float) -> Array:
+    """Return y(dt) of y_dot = -A y + b, y(0) = 0, for A >= 0 (m, m) and b (m,).
+
+    V diag((1 - e^{-λ dt}) / λ) V' b with A = V diag(λ) V'.
     """
-    eigenvalues, vectors = np.linalg.eigh(rows.matrix)
+    eigenvalues, vectors = np.linalg.eigh(matrix)
     eigenvalues = np.maximum(eigenvalues, 0.0)
     rate = dt * eigenvalues
     # (1 - e^-x)/x -> 1 as x -> 0
     step = dt * np.where(rate > 1e-8, -np.expm1(-rate) / np.maximum(rate, 1e-8), 1.0)
-    return np.asarray(critic - vectors @ (step * (vectors.T @ rows.gradient)))
+    return np.asarray(vectors @ (step * (vectors.T @ gradient)))
 
 
 class LeastSquares:
@@ -109,19 +143,33 @@ class LeastSquares:
         self.forgetting = forgetting
         self.covariance_bound = covariance_bound
         self.information = np.eye(n_basis) / covariance
+        self._factor = np.eye(n_basis) / np.sqrt(covariance)
 
     @property
     def covariance_norm(self) -> float:
         """λ_max(Γ), the largest eigenvalue of the covariance."""
+        found = largest_covariance(self._factor)
+        if found is not None:
+            return found
         least = scipy.linalg.eigvalsh(self.information, subset_by_index=[0, 0])
         return float(1.0 / max(least[0], np.finfo(float).tiny))
 
-    def step(self, critic: Array, rows: NormalEquations, dt: float) -> Array:
-        """Return Ŵ_c after dt with frozen rows, shape (m,), and update the covariance."""
+    def step(self, critic: Array, rows: Equations, dt: float) -> Array:
+        """Return Ŵ_c after dt with frozen rows, shape (m,), and update the covariance.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If the information matrix is not positive definite.
+        """
         fraction = min(1.0, self.covariance_norm / self.covariance_bound)
         # a late step may not forget more than the bound leaves
         decay = max(np.exp(-self.forgetting * (1.0 - fraction) * dt), fraction)
         factor = -dt * (1.0 - decay) / np.log(decay) if decay < 1.0 else dt
+        # a new array: who has seen the old one keeps it
         self.information = decay * self.information + factor * rows.matrix
-        factorized = scipy.linalg.cho_factor(self.information, lower=True)
-        return np.asarray(critic - factor * scipy.linalg.cho_solve(factorized, rows.gradient))
+        self._factor, failed = lapack.dpotrf(self.information.T, lower=1)
+        if failed:
+            raise np.linalg.LinAlgError("the information matrix is not positive definite")
+        pull, _ = lapack.dpotrs(self._factor, rows.gradient, lower=1)
+        return np.asarray(critic - factor * pull)

@@ -10,12 +10,14 @@ from ..symbolic import Basis, Game, Path, Problem, ValueFunctions, growing_steps
 from ..symbolic.vehicle import Array
 from .actor import Projection, actor_step
 from .bellman import BellmanTerms, Residual, bellman_error
-from .critic import LeastSquares, NormalEquations, gradient_step, row_weights
+from .critic import Equations, LeastSquares, NormalEquations, gradient_step, row_weights
 from .memory import Memory
 from .rows import BellmanSource, CostateSource, PathRows, RelativeTo, RowSource, SampleRows, Weights
 from .safeguard import Safeguard
 from .samples import FixedSamples, SampleStrategy
 from .settings import LearnerSettings, SampleSettings
+from .vector_code import library
+from .vector_rows import RowGains, VectorRows
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ class LearnerStep:
     bellman_error: float
     sample_error: float
     projecting: bool
-    rows: NormalEquations
+    rows: Equations
     information: Array
     predicted_cost: float = np.nan
     accepted: float = 1.0
@@ -100,6 +102,7 @@ class Learner:
         )
         self._floor = 1e-5 * float(problem.scale @ problem.game.Q @ problem.scale)
         self._steps = growing_steps(settings.horizon, settings.steps)
+        self._vector: VectorRows | None = None
         self._source = self._row_source(samples, paths or SampleSettings())
         self._fixed_leash = self._leash(reference) if settings.error == "bellman" else None
         self.memory = self._new_memory(envelope, paths or SampleSettings())
@@ -147,17 +150,15 @@ class Learner:
 
     def observe(self, zeta: Array) -> LearnerStep:
         """Return what a step at ζ (n,) would see at the present samples, without moving anything."""
-        terms = self._terms(zeta[None, :])
-        here = self._residual(terms, self._weights)
-        there = self._source.rows(self._weights)
+        delta, error, rows = self._seen(zeta)
         return LearnerStep(
             critic=self.critic,
             actor_1=self.actor_1,
             actor_2=self.actor_2,
-            bellman_error=float(here.delta[0]),
-            sample_error=np.nan if there is None else there.error,
+            bellman_error=delta,
+            sample_error=error,
             projecting=any(self.projection.active(actor) for actor in self._weights[1:]),
-            rows=self._rows(terms, here, there),
+            rows=rows,
             information=self._least_squares.information,
         )
 
@@ -182,6 +183,16 @@ class Learner:
     @property
     def _weights(self) -> Weights:
         return self.critic, self.actor_1, self.actor_2
+
+    def _seen(self, zeta: Array) -> tuple[float, float, Equations]:
+        """Return δ at ζ, the error at the samples, and the rows of both, summed."""
+        if self._vector is not None and self._fixed_leash is not None:
+            return self._vector.observe(zeta, self._weights, self._fixed_leash, self.reference)
+        terms = self._terms(zeta[None, :])
+        here = self._residual(terms, self._weights)
+        there = self._source.rows(self._weights)
+        error = np.nan if there is None else there.error
+        return float(here.delta[0]), error, self._rows(terms, here, there)
 
     def _rows(self, terms: BellmanTerms, here: Residual, there: SampleRows | None) -> NormalEquations:
         """Sum the rows at the state and at the samples, and the leash."""
@@ -210,9 +221,12 @@ class Learner:
 
     def _gained(self, rows: SampleRows) -> Array:
         """Return η_c w_j of the sample rows, shape (N,)."""
+        return self._sample_gain(len(rows)) * rows.weights
+
+    def _sample_gain(self, n_samples: int) -> float:
         settings = self.settings
         gain = settings.gain_critic if settings.gain_samples is None else settings.gain_samples
-        return np.asarray((gain / len(rows) if settings.average_samples else gain) * rows.weights)
+        return gain / n_samples if settings.average_samples else gain
 
     def _leash(self, reference: Array) -> Array:
         """Return the leash at the reference weights."""
@@ -243,7 +257,20 @@ class Learner:
                 seed=paths.seed,
             )
         strategy = FixedSamples(samples) if isinstance(samples, np.ndarray) else samples
-        return BellmanSource(strategy, self._terms, self._residual, self._row_weights, self._predict)
+        return BellmanSource(
+            strategy, self._terms, self._residual, self._row_weights, self._predict, self._placed
+        )
+
+    def _placed(self, points: Array) -> None:
+        """Tell the compiled rows, if there is a compiler, where the samples are."""
+        compiled = library() if self.functions.compiled and len(points) else None
+        if self._vector is None and compiled is not None:
+            settings = self.settings
+            gain = self._sample_gain(len(points))
+            gains = RowGains(settings.gain_critic, gain, settings.normalizer, self._floor)
+            self._vector = VectorRows(self.functions, compiled, len(points), gains)
+        if self._vector is not None:
+            self._vector.place(points)
 
     def _path_rows(self, points: int, relative_to: RelativeTo = "rest") -> PathRows:
         prediction = self.functions.prediction(self.settings.steps)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..symbolic.vehicle import Array
 from .bellman import BellmanTerms, Residual, bellman_error
-from .critic import NormalEquations
+from .critic import Equations
 from .learner import Learner, LearnerStep
 from .samples import regressor_spectrum
 
@@ -117,7 +117,7 @@ class Monitor:
         return self._terms
 
 
-def row_margin(rows: NormalEquations) -> float:
+def row_margin(rows: Equations) -> float:
     """Return λ_min(S M S); at least l/(1+l) where the leash is the part l of each weight's rows.
 
     NaN if a row is not finite.
@@ -127,7 +127,7 @@ def row_margin(rows: NormalEquations) -> float:
     return float(max(np.linalg.eigvalsh(_scaled(rows, rows.matrix))[0], 0.0))
 
 
-def row_rank(rows: NormalEquations) -> int:
+def row_rank(rows: Equations) -> int:
     """Return in how many directions v' Σ η w ω ω' v > v'diag(ρ) v, by the inertia of M - 2 diag(ρ).
 
     0 if a row is not finite.
@@ -138,7 +138,7 @@ def row_rank(rows: NormalEquations) -> int:
     return int(np.sum(excess > len(excess) * np.finfo(float).eps * max(excess[-1], 1.0)))
 
 
-def _scaled(rows: NormalEquations, matrix: Array) -> Array:
+def _scaled(rows: Equations, matrix: Array) -> Array:
     """Return S `matrix` S; a weight that no row says anything about stays zero."""
     diagonal = np.diag(rows.matrix)
     scale = np.where(diagonal > 0.0, diagonal, np.inf) ** -0.5

@@ -63,6 +63,7 @@ class BellmanSource:
     residual : δ and ω of terms under weights
     row_weights : w from ω (N, m) and ζ'Qζ (N,)
     predict : the path from ζ under actor weights
+    placed : is told where the points are
     """
 
     def __init__(
@@ -72,24 +73,27 @@ class BellmanSource:
         residual: Callable[[BellmanTerms, Weights], Residual],
         row_weights: Callable[[Array, Array], Array],
         predict: Callable[[Array, Array, Array], Path],
+        placed: Callable[[Array], None],
     ) -> None:
         self._strategy = strategy
         self._evaluate, self._residual, self._row_weights = terms, residual, row_weights
-        self._predict = predict
-        points = strategy.first()
-        self._terms = terms(points) if len(points) else None
+        self._predict, self._placed = predict, placed
+        self._terms: BellmanTerms | None = None
+        self._place(strategy.first())
 
     def move(self, zeta: Array, weights: Weights) -> None:
         """Move the points, and evaluate f, g and σ' there, if the strategy moves them."""
         path: Predict = lambda: self._predict(zeta, *weights[1:])  # noqa: E731
-        points = None if self._terms is None else self._strategy.moved(zeta, path)
+        points = self._strategy.moved(zeta, path) if len(self._points) else None
         if points is not None:
-            self._terms = self._evaluate(points)
+            self._place(points)
 
     def rows(self, weights: Weights) -> SampleRows | None:
         """Return the rows under the present weights; the relative error is δ / ζ'Qζ."""
-        if self._terms is None:
+        if not len(self._points):
             return None
+        if self._terms is None:
+            self._terms = self._evaluate(self._points)
         residual = self._residual(self._terms, weights)
         relative = residual.delta / self._terms.state_cost
         return SampleRows(
@@ -97,6 +101,11 @@ class BellmanSource:
             self._row_weights(residual.omega, self._terms.state_cost),
             float(np.sqrt(np.mean(relative**2))),
         )
+
+    def _place(self, points: Array) -> None:
+        self._points = points
+        self._terms = None
+        self._placed(points)
 
 
 class PathRows:

@@ -1,11 +1,12 @@
 """C code of a CasADi function, compiled into a content-addressed cache.
 
-The key is the SHA-256 of the generated C text (which is the whole graph), the compiler and its
-version, the flags, the machine and the CasADi version. An entry is a folder that holds the source,
-the shared library and a manifest with the library's own SHA-256. It is built under a temporary name
-and renamed, so that concurrent builds of one key both end with one whole entry; an entry whose
-manifest doesn't match its library is thrown away and built again. An entry is never overwritten in
-place: a library that is already loaded would silently keep answering for the new one.
+The key is the SHA-256 of the C text (which is the whole graph), the compiler and its version, the
+flags, the machine (with -march=native, all that the compiler says of this processor) and the CasADi
+version. An entry is a folder that holds the source, the shared library and a manifest with the
+library's own SHA-256. It is built under a temporary name and renamed, so that concurrent builds of one
+key both end with one whole entry; an entry whose manifest doesn't match its library is thrown away and
+built again. An entry is never overwritten in place: a library that is already loaded would silently
+keep answering for the new one.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ logger = logging.getLogger("stationkeep")
 
 # -O2 without contraction of a*b+c is bit-equal to CasADi's virtual machine.
 FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
+# For hand-written loops: the vectors of this very processor, whose features belong in the key.
+NATIVE_FLAGS = ("-O3", "-fPIC", "-shared", "-march=native", "-ffp-contract=fast")
 _TEMPORARY = ".build-"
 _STALE_AFTER = 3600.0  # s; a temporary folder older than this was left by a killed build
 
@@ -92,10 +95,25 @@ def c_source(function: casadi.Function) -> str:
     return str(generator.dump())
 
 
+@cache
+def _target(path: str) -> str:
+    """Return what the compiler defines for this processor: its vector extensions and more."""
+    command = [path, "-march=native", "-dM", "-E", "-x", "c", os.devnull]
+    answer = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    return "\n".join(sorted(answer.stdout.splitlines()))
+
+
 def compile_function(function: casadi.Function, wrapper: str = "") -> Library:
     """Return the compiled library of a function, from the cache or newly built.
 
-    `wrapper` is C code that is appended to the generated code and may call it.
+    `wrapper` is C code that is appended to the generated code and may call it. Raises as
+    `compile_source`.
+    """
+    return compile_source(c_source(function) + wrapper, FLAGS)
+
+
+def compile_source(source: str, flags: tuple[str, ...]) -> Library:
+    """Return the compiled library of C code, from the cache or newly built.
 
     Raises
     ------
@@ -105,13 +123,12 @@ def compile_function(function: casadi.Function, wrapper: str = "") -> Library:
     compiler = find_compiler()
     if compiler is None:
         raise CompilationError("no C compiler was found (cc, gcc, clang)")
-    source = c_source(function) + wrapper
-    key = _key(source, compiler)
+    key = _key(source, compiler, flags)
     entry = cache_folder() / key
     if _is_whole(entry):
         return Library(entry / "function.so", key, cache_hit=True)
     try:
-        _build(source, compiler, entry)
+        _build(source, compiler, flags, entry)
     except OSError as error:
         reason = error.strerror or str(error)
         raise CompilationError(
@@ -121,14 +138,15 @@ def compile_function(function: casadi.Function, wrapper: str = "") -> Library:
     return Library(entry / "function.so", key, cache_hit=False)
 
 
-def _key(source: str, compiler: Compiler) -> str:
+def _key(source: str, compiler: Compiler, flags: tuple[str, ...]) -> str:
     parts = (
         source,
         compiler.path,
         compiler.version,
-        *FLAGS,
+        *flags,
         platform.system(),
         platform.machine(),
+        _target(compiler.path) if "-march=native" in flags else "",
         casadi.CasadiMeta.version(),
     )
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
@@ -147,7 +165,7 @@ def _is_whole(entry: Path) -> bool:
         return False
 
 
-def _build(source: str, compiler: Compiler, entry: Path) -> None:
+def _build(source: str, compiler: Compiler, flags: tuple[str, ...], entry: Path) -> None:
     entry.parent.mkdir(parents=True, exist_ok=True)
     _remove_stale(entry.parent)
     folder = entry.parent / f"{_TEMPORARY}{os.getpid()}-{uuid.uuid4().hex}"
@@ -155,13 +173,13 @@ def _build(source: str, compiler: Compiler, entry: Path) -> None:
     try:
         code, library = folder / "function.c", folder / "function.so"
         code.write_text(source, encoding="utf-8")
-        command = [compiler.path, *FLAGS, str(code), "-o", str(library), "-lm"]
+        command = [compiler.path, *flags, str(code), "-o", str(library), "-lm"]
         answer = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
         if answer.returncode != 0 or not library.is_file():
             fault = (answer.stderr.strip() or "no message").partition("\n")[0]
             fault = fault.replace(f"{folder}{os.sep}", "")
             raise CompilationError(f"'{compiler.path}' failed ({fault})")
-        manifest = {"sha256": _digest(library), "compiler": compiler.version, "flags": FLAGS}
+        manifest = {"sha256": _digest(library), "compiler": compiler.version, "flags": flags}
         (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
         _publish(folder, entry)
     finally:

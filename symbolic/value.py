@@ -10,9 +10,11 @@ import casadi
 from casadi import DM, MX, SX
 
 from .basis import Basis
+from .batch import BatchKernel
 from .kernel import Export, Kernel, dense_function, export
 from .prediction import Prediction
 from .problem import Problem
+from .sparse_terms import TermLayout, sparse_terms
 from .vehicle import Array
 
 
@@ -37,7 +39,7 @@ class ValueFunctions:
     def __init__(self, problem: Problem, basis: Basis, *, compiled: bool = True) -> None:
         self.problem = problem
         self.basis = basis
-        self._compiled = compiled
+        self.compiled = compiled
         self._exports: dict[str, Export] = {}
         self._samplers: dict[int, Kernel] = {}
         self._predictions: dict[int, Prediction] = {}
@@ -95,6 +97,27 @@ class ValueFunctions:
         f, g, sigma_prime = (_by_point(output, n_points) for output in kernel.outputs)
         return PointTerms(f[..., 0], g, sigma_prime)
 
+    @cached_property
+    def term_layout(self) -> TermLayout:
+        """Layout of the sparse terms."""
+        return self._sparse_terms[1]
+
+    @cached_property
+    def terms(self) -> Kernel:
+        """σ', f, g and ζ'Qζ from zeta, without zeros, as `term_layout` says."""
+        kernel, described = export(self._sparse_terms[0], compiled=self.compiled)
+        self._exports["sparse_terms"] = described
+        return kernel
+
+    @cached_property
+    def many_terms(self) -> BatchKernel:
+        """The sparse terms at the rows of points (N, n), shape (N, entries)."""
+        return BatchKernel(self._sparse_terms[0], compiled=self.compiled)
+
+    @cached_property
+    def _sparse_terms(self) -> tuple[casadi.Function, TermLayout]:
+        return sparse_terms(self.problem, self.basis)
+
     def prediction(self, n_steps: int) -> Prediction:
         """Return the predicted closed loop of N steps and its costates."""
         if n_steps not in self._predictions:
@@ -125,12 +148,12 @@ class ValueFunctions:
         return dense_function("point", {"zeta": zeta}, outputs)
 
     def _export_mapped(self, function: casadi.Function, operations: int) -> Kernel:
-        kernel, described = export(function, compiled=self._compiled, operations=operations)
+        kernel, described = export(function, compiled=self.compiled, operations=operations)
         self._exports[function.name()] = described
         return kernel
 
     def _export(self, name: str, inputs: dict[str, SX], outputs: dict[str, SX]) -> Kernel:
-        kernel, described = export(dense_function(name, inputs, outputs), compiled=self._compiled)
+        kernel, described = export(dense_function(name, inputs, outputs), compiled=self.compiled)
         self._exports[name] = described
         return kernel
 

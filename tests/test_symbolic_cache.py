@@ -232,3 +232,16 @@ def test_left_overs_of_killed_builds_are_removed_in_time(empty_cache: Path) -> N
     os.utime(old, (two_hours_ago, two_hours_ago))
     compile_function(tiny())
     assert left_over(empty_cache) == [young.name]
+
+
+def test_the_processor_is_in_the_key_of_native_code(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cache folder may be shared by machines with other vector extensions."""
+    source = "double twice(double x) { return x + x; }\n"
+    first = compilation.compile_source(source, compilation.NATIVE_FLAGS)
+    assert compilation.compile_source(source, compilation.NATIVE_FLAGS).cache_hit
+    monkeypatch.setattr(compilation, "_target", lambda path: "another processor")
+    second = compilation.compile_source(source, compilation.NATIVE_FLAGS)
+    assert not second.cache_hit
+    assert first.key != second.key
