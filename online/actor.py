@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +47,7 @@ class Projection:
 
     def active(self, theta: Array) -> bool:
         """Return whether θ lies in the layer where the projection acts."""
-        return float(np.linalg.norm(theta)) > self.bound
+        return float(theta @ theta) > self.bound**2
 
 
 def actor_step(actor: Array, critic: Array, gain: float, dt: float, projection: Projection) -> Array:
@@ -56,8 +57,8 @@ def actor_step(actor: Array, critic: Array, gain: float, dt: float, projection: 
     projected. The ball is convex, so pulling the end point back to it (what a finite step overshoots
     is of second order in dt) never moves it away from weights inside.
     """
-    mean_rate = -np.expm1(-gain * dt) / dt * (critic - actor)
+    mean_rate = -math.expm1(-gain * dt) / dt * (critic - actor)
     moved = actor + dt * projection(actor, mean_rate)
     outer = projection.bound + projection.margin
-    norm = float(np.linalg.norm(moved))
+    norm = math.sqrt(moved @ moved)
     return np.asarray(moved if norm <= outer else moved * (outer / norm))

@@ -78,6 +78,7 @@ class History:
     remembered: Array | None = None
     stopped: str | None = None
     wall_seconds: float = 0.0
+    processor_seconds: float = 0.0
     policy_median: float = 0.0
     policy_mean: float = 0.0
 
@@ -101,13 +102,14 @@ def run(
     if source is None:
         source = build_disturbance(scenario.simulation.disturbance)
     loop = _Loop(scenario, Controller(scenario) if policy is None else policy, source)
-    started = time.perf_counter()
+    started, worked = time.perf_counter(), time.process_time()
     try:
         loop.go(progress)
     except KeyboardInterrupt:
         loop.history.stopped = f"interrupted at t = {loop.t:.2f} s"
     loop.finish()
     loop.history.wall_seconds = time.perf_counter() - started
+    loop.history.processor_seconds = time.process_time() - worked
     return loop.history
 
 

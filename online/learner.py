@@ -130,14 +130,14 @@ class Learner:
             actor_step(actors[0], self.critic, gains[0], dt, self.projection),
             actor_step(actors[1], self.critic, gains[1], dt, self.projection),
         )
-        accepted = 1.0
         if self._guard is not None:
             proposed, accepted = self._guard.accepted(zeta, actors, proposed, cost)
+            fallback = restarted and accepted == 0.0
+            seen = replace(seen, predicted_cost=cost, accepted=accepted, fallback=fallback)
         self.actor_1, self.actor_2 = proposed
         if self.memory is not None:
             self.memory.step()
-        fallback = restarted and accepted == 0.0
-        return replace(seen, predicted_cost=cost, accepted=accepted, fallback=fallback)
+        return seen
 
     def certify(self, zeta: Array) -> LearnerStep:
         """Use the initial weights where they are predicted to cost less than the reference, else that.
