@@ -41,7 +41,7 @@ def library() -> ctypes.CDLL | None:
         return None
 
 
-def largest_covariance(factor: Array, steps: int = 24) -> float | None:
+def largest_covariance(factor: Array, steps: int = 16) -> float | None:
     """Return λ_max of (L L')^-1 by Lanczos' method, L the lower triangle of `factor` (m, m).
 
     A residual r of its Ritz vector leaves an error of r^2 / gap; None when r exceeds 1e-6 λ_max, or
