@@ -129,7 +129,7 @@ class _Loop:
         self.history = History()
         self.policy_seconds: list[float] = []
         self.state = PlantState(np.array(self.settings.initial_state), 0.0, 0.0)
-        self.t = 0.0
+        self.t = self.next_look = 0.0
 
     def go(self, progress: Progress | None) -> None:
         period = self.settings.control_period
@@ -200,7 +200,8 @@ class _Loop:
 
     def _record_learner(self, seen: LearnerStep, *, last: bool = False) -> None:
         history = self.history
-        if self.monitor and (last or len(history.learn_time) % self.settings.monitor_every == 0):
+        if self.monitor and (last or self.t >= self.next_look - 1e-9):
+            self.next_look = self.t + self.settings.monitor_period
             history.looks.append(self.monitor.look(self.t, seen))
         history.learn_time.append(self.t)
         history.bellman_error.append(seen.bellman_error)

@@ -172,7 +172,7 @@ class SimulationSettings(Settings):
     tolerance : relative tolerance of the plant's integration
     pitch_limit : the run ends when |pitch| exceeds it [deg]
     chi : the run ends when a state exceeds this multiple of the full envelope's half-width
-    monitor_every : learning steps between two looks of the monitor
+    monitor_period : least time between two looks of the monitor [s]
     seed : of the envelope states that `compare` adds
     plant : the vehicle that is driven, a shipped name or the path of a TOML file; the scenario's own,
         which the controller is made for, when not given
@@ -187,7 +187,7 @@ class SimulationSettings(Settings):
     tolerance: Annotated[float, Field(gt=0.0, lt=1e-2)] = 1e-8
     pitch_limit: Annotated[float, Field(gt=0.0, lt=90.0)] = 75.0
     chi: PositiveFloat = 2.0
-    monitor_every: PositiveInt = 4
+    monitor_period: PositiveFloat = 1.0
     seed: NonNegativeInt = 1
     plant: str | None = None
     thruster_limits: bool = False

@@ -30,7 +30,7 @@ Check = Callable[[BaseException], str]
 GRADIENT = (
     *("learner.rule=gradient", "learner.error=bellman", "learner.safeguard=false"),
     *("learner.normalizer=paper", "learner.leash=0", "simulation.duration=0.6"),
-    "simulation.monitor_every=1",
+    "simulation.monitor_period=0.001",
 )
 
 

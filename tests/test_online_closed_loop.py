@@ -229,7 +229,7 @@ def test_learned_weights_are_recorded_as_they_become_active() -> None:
 
 
 def test_the_monitor_looks_at_its_own_pace_and_at_the_end() -> None:
-    history = run(quick_scenario("simulation.monitor_every=3"))
+    history = run(quick_scenario("simulation.monitor_period=0.75"))
     every_third = history.learn_time[:-1:3]
     assert [look.time for look in history.looks] == [*every_third, history.time[-1]]
 

@@ -151,7 +151,7 @@ COSTATE = ("learner.error=costate", "learner.safeguard=true", "simulation.durati
 
 
 def costate_run() -> History:
-    return run(quick_scenario(*COSTATE, "simulation.monitor_every=1"))
+    return run(quick_scenario(*COSTATE, "simulation.monitor_period=0.001"))
 
 
 def test_costate_rows_leave_18_alone() -> None:

@@ -131,7 +131,7 @@ def test_covariance_norm_where_lanczos_has_not_converged() -> None:
     """Many directions of which almost nothing is known: a sixteenth vector does not tell them apart."""
     law = LeastSquares(78, 1.0, 1e2, 1e4)
     steps = np.linspace(1.0, 1.1, 78)
-    law.step(np.zeros(78), NormalEquations(np.diag(steps), np.zeros(78)), 1e-3)
+    law.step(np.zeros(78), NormalEquations(np.diag(steps), *np.zeros((2, 78))), 1e-3)
     assert largest_covariance(law._factor) is None
     expected = 1.0 / np.linalg.eigvalsh(law.information)[0]
     assert law.covariance_norm == pytest.approx(expected, rel=1e-12)
