@@ -13,6 +13,7 @@ from pydantic import (
     model_validator,
 )
 
+from ..symbolic.prediction import BOUND
 from ..symbolic.settings import Settings
 from .critic import Normalizer
 from .samples import Strategy
@@ -171,7 +172,9 @@ class SimulationSettings(Settings):
     control_period : zero-order hold of the controller [s]
     tolerance : relative tolerance of the plant's integration
     pitch_limit : the run ends when |pitch| exceeds it [deg]
-    chi : the run ends when a state exceeds this multiple of the full envelope's half-width
+    chi : the run ends, the vehicle lost, when a state exceeds this multiple of the full envelope's
+        half-width; the default is where predictions end too, and a quarter more than the optimum needs
+        from the envelope's corners (docs/robustness.md)
     monitor_period : least time between two looks of the monitor [s]
     seed : of the envelope states that `compare` adds
     plant : the vehicle that is driven, a shipped name or the path of a TOML file; the scenario's own,
@@ -186,7 +189,7 @@ class SimulationSettings(Settings):
     control_period: PositiveFloat = 0.02
     tolerance: Annotated[float, Field(gt=0.0, lt=1e-2)] = 1e-8
     pitch_limit: Annotated[float, Field(gt=0.0, lt=90.0)] = 75.0
-    chi: PositiveFloat = 2.0
+    chi: PositiveFloat = BOUND
     monitor_period: PositiveFloat = 1.0
     seed: NonNegativeInt = 1
     plant: str | None = None

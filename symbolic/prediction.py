@@ -27,7 +27,7 @@ from .kernel import Kernel, dense_function
 from .problem import Problem
 from .vehicle import Array
 
-BOUND = 4.0  # half-widths; a predicted path that gets farther has left, and its cost is infinite
+BOUND = 4.0  # half-widths; a path that gets farther counts as lost, and its cost is infinite
 Exporter = Callable[[casadi.Function, int], Kernel]
 
 

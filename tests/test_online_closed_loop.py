@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from stationkeep.comparison import Scenario
+from stationkeep.offline import DirectSolver
 from stationkeep.online import Controller, History, run
 from stationkeep.symbolic import InputError, RunError
+from stationkeep.symbolic.prediction import BOUND
 
 from .games import Array, quick_scenario
 
@@ -155,6 +157,17 @@ def test_run_ends_when_the_pitch_leaves_its_band() -> None:
     history = run(scenario, Held(np.array([0, 0, 0, 0, 3.0, 0])))
     assert_ends(history, "the pitch left ±20 deg (20.")
     assert np.degrees(history.zeta[-1][4]) <= 20.0
+
+
+def test_the_optimum_stays_in_the_default_chi() -> None:
+    """From the corner where it goes farthest, the optimum spins at three half-widths, beyond two."""
+    station = quick_scenario().station_keeping()
+    signs = np.array([1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1])
+    solver = DirectSolver(station.problem, horizon=60.0, n_intervals=16, degree=6, grading=6.0)
+    states = solver.solve(signs * station.half_widths, verify=False).trajectory.states
+    farthest = np.abs(states / station.half_widths).max()
+    assert farthest == pytest.approx(3.15, abs=0.01)
+    assert farthest < quick_scenario().simulation.chi == BOUND
 
 
 def test_run_ends_when_the_state_leaves_chi() -> None:
