@@ -6,6 +6,7 @@ from .controller import Controller
 from .disturbance import build_disturbance
 from .learner import Learner, LearnerStep
 from .monitor import Look, Monitor
+from .observer import DisturbanceObserver
 from .record import load, load_weights, save, to_dataset
 from .samples import draw_samples, rank_margin
 from .settings import (
@@ -20,6 +21,7 @@ __all__ = [
     "Allocation",
     "Allocator",
     "Controller",
+    "DisturbanceObserver",
     "DisturbanceSettings",
     "History",
     "Learner",

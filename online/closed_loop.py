@@ -18,6 +18,7 @@ from .disturbance import DisturbanceSource, build_disturbance
 from .learner import LearnerStep
 from .monitor import Look, Monitor
 from .noise import MeasurementNoise
+from .observer import DisturbanceObserver
 from .plant import HeldPlant, PlantState
 from .settings import SimulationSettings
 
@@ -64,6 +65,7 @@ class History:
     attenuated: list[float] = field(default_factory=list)
     thrust: list[Array] = field(default_factory=list)
     saturated: list[bool] = field(default_factory=list)
+    estimate: list[Array] = field(default_factory=list)
     learn_time: list[float] = field(default_factory=list)
     bellman_error: list[float] = field(default_factory=list)
     sample_error: list[float] = field(default_factory=list)
@@ -126,6 +128,8 @@ class _Loop:
         limited = self.settings.thruster_limits
         self.thrusters = Allocator(vehicle or self.station.model.vehicle) if limited else None
         self.noise = MeasurementNoise(self.settings.noise)
+        bandwidth = self.settings.observer_bandwidth
+        self.observer = DisturbanceObserver(self.station, bandwidth) if bandwidth else None
         self.history = History()
         self.policy_seconds: list[float] = []
         self.state = PlantState(np.array(self.settings.initial_state), 0.0, 0.0)
@@ -160,17 +164,23 @@ class _Loop:
                 progress(self.t + period)
 
     def _command(self, period: float) -> Array:
-        """Return what the vehicle gets of the policy's wrench, timed and allocated."""
+        """Return what the vehicle gets of the policy's wrench: timed, compensated and allocated."""
         seen = self.noise.measure(self.state.zeta)
         started = time.perf_counter()
         tau_b = self.policy.step(seen[:6], seen[6:], period)
         self.policy_seconds.append(time.perf_counter() - started)
-        if self.thrusters is None:
-            return tau_b
-        given = self.thrusters.allocate(tau_b)
-        self.history.thrust.append(given.thrust)
-        self.history.saturated.append(given.saturated)
-        return given.wrench
+        if self.observer is not None:
+            estimate = self.observer.step(seen, period)
+            tau_b = tau_b - self.policy.body_wrench(estimate)
+            self.history.estimate.append(estimate)
+        if self.thrusters is not None:
+            given = self.thrusters.allocate(tau_b)
+            self.history.thrust.append(given.thrust)
+            self.history.saturated.append(given.saturated)
+            tau_b = given.wrench
+        if self.observer is not None:
+            self.observer.applied(tau_b)
+        return tau_b
 
     def _out_of_bounds(self) -> str | None:
         zeta, settings = self.state.zeta, self.settings

@@ -39,8 +39,9 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     Dimensions: `time` (control steps), `learn_time` (learning steps, each with the weights before it,
     and the end of the run), `look_time` (looks of the monitor), `player` (control, disturbance),
     `state`, `force`, `basis`, and with thruster limits `thruster`. `tau_b` is the wrench that the
-    vehicle got. Attributes: `saturated`, the share of the control steps at which the least-norm thrusts
-    exceeded a limit; median and mean wall time of a policy's step [us].
+    vehicle got; `disturbance_estimate` is there with an observer. Attributes: `saturated`, the share of
+    the control steps at which the least-norm thrusts exceeded a limit; median and mean wall time of a
+    policy's step [us].
     """
     m = len(history.critic[0]) if history.critic else 0
 
@@ -128,6 +129,9 @@ def _with_actuation(record: xr.Dataset, history: History) -> xr.Dataset:
         thrust = np.array(history.thrust[:n_time]).reshape(n_time, -1)
         record["thrust"] = (("time", "thruster"), thrust, {"units": "N"})
         record.attrs["saturated"] = float(np.mean(history.saturated))
+    if history.estimate:
+        estimate = np.array(history.estimate[:n_time])
+        record["disturbance_estimate"] = (("time", "force"), estimate, {"units": _FORCE_UNITS})
     record.attrs["policy_microseconds"] = 1e6 * history.policy_median
     record.attrs["policy_microseconds_mean"] = 1e6 * history.policy_mean
     return record

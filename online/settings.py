@@ -181,6 +181,8 @@ class SimulationSettings(Settings):
         which the controller is made for, when not given
     thruster_limits : whether the plant gets what its thrusters can give instead of what is asked for
     noise : on what the policy sees
+    observer_bandwidth : of a `DisturbanceObserver` whose estimate is fed forward [1/s]; 0 is none. For
+        `disturbed` mode: in `game` mode it would cancel what the disturbance player does
     """
 
     initial_state: tuple[float, ...] = Field(min_length=12, max_length=12)
@@ -195,4 +197,14 @@ class SimulationSettings(Settings):
     plant: str | None = None
     thruster_limits: bool = False
     noise: NoiseSettings = NoiseSettings()
+    observer_bandwidth: NonNegativeFloat = 0.0
     disturbance: DisturbanceSettings = DisturbanceSettings()
+
+    @model_validator(mode="after")
+    def _observed(self) -> SimulationSettings:
+        if self.observer_bandwidth > 0.0 and self.mode == "game":
+            raise ValueError(
+                f"observer_bandwidth is {self.observer_bandwidth:g} and mode is 'game', but there an "
+                'observer would cancel what the disturbance player does; choose mode = "disturbed"'
+            )
+        return self
