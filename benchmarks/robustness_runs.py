@@ -16,7 +16,7 @@ from stationkeep.online import draw_samples
 from stationkeep.symbolic import Vehicle
 
 Array = np.ndarray
-REST = (0.0,) * 12
+REST = np.zeros(12)
 SEA = {"kind": "waves", "wave_height": 0.25, "wave_period": 4.0, "depth": 3.0, "wave_heading": 30.0}
 ROUGH = SEA | {"wave_height": 0.5, "wave_period": 5.0}
 NOISE = {"position": 0.02, "attitude": 0.01, "velocity": 0.02, "rate": 0.01, "seed": 1}
@@ -96,7 +96,7 @@ def dissipation_runs(scenario: Scenario, options: argparse.Namespace) -> tuple[s
         disturbance = current(speed, heading, start) if number % 2 else waves | {"seed": number}
         rest = number % 4 < 2
         changes = from_state(
-            np.array(REST) if rest else state,
+            REST if rest else state,
             mode="disturbed",
             duration=30.0,
             disturbance=disturbance,
@@ -130,13 +130,9 @@ def current_runs(_: Scenario, __: argparse.Namespace) -> tuple[str, list[Run]]:
                     "observer": f"{bandwidth:g} 1/s" if bandwidth else "",
                 }
                 changes = {"disturbance": disturbance, "observer_bandwidth": bandwidth}
-                runs.append(Run(labels, policy, from_rest(60.0, **changes)))
+                changes |= {"mode": "disturbed", "duration": 60.0}
+                runs.append(Run(labels, policy, from_state(REST, **changes)))
     return "from rest at the station, 60 s", runs
-
-
-def from_rest(duration: float, **changes: Any) -> dict[str, Any]:
-    """Return settings of a disturbed run from rest."""
-    return from_state(np.array(REST), mode="disturbed", duration=duration) | changes
 
 
 def weaker(name: str, share: float, folder: Path) -> str:
@@ -153,12 +149,13 @@ def weaker(name: str, share: float, folder: Path) -> str:
 
 
 def limit_runs(scenario: Scenario, options: argparse.Namespace) -> tuple[str, list[Run]]:
-    """Corners of the envelope in still water, and currents and waves, with ever weaker thrusters."""
+    """Corners of the envelope in still water, and currents, with ever weaker thrusters."""
     half_widths = scenario.station_keeping().half_widths
     corners = half_widths * np.random.default_rng(SEED + 2).choice([-1.0, 1.0], (10, 12))
     cases = [("corners", n, from_state(corner)) for n, corner in enumerate(corners)]
-    cases += [("current 0.25 m/s", 0, from_state(np.array(REST), disturbance=current(0.25)))]
-    cases += [("waves Hs 0.5 m", 0, from_state(np.array(REST), disturbance=ROUGH))]
+    cases += [("current 0.25 m/s", 0, from_state(REST, disturbance=current(0.25)))]
+    held = from_state(REST, disturbance=current(0.5), observer_bandwidth=1.0)
+    cases += [("0.5 m/s, observer", 0, held)]
     folder = options.rows.parent
     limits: dict[str, dict[str, Any]] = {"none": {}}
     for share in (1.0, 0.5, 0.25, 0.125, 0.0625):
@@ -174,7 +171,9 @@ def limit_runs(scenario: Scenario, options: argparse.Namespace) -> tuple[str, li
         for name, changes in limits.items()
         for policy in ("learned", "linear", "mpc")
     ]
-    title = "30 s with a share of the thruster limits at 16 V; corners in still water, others from rest"
+    title = (
+        "30 s with a share of the thruster limits at 16 V; corners in still water, currents from rest"
+    )
     return title, runs
 
 
@@ -183,8 +182,8 @@ def noise_runs(scenario: Scenario, _: argparse.Namespace) -> tuple[str, list[Run
     half_widths = scenario.station_keeping().half_widths
     states = draw_samples(half_widths, 4, SEED + 3, inner=0.5)
     cases = [("envelope", from_state(state)) for state in states]
-    cases += [("current 0.25 m/s", from_state(np.array(REST), disturbance=current(0.25)))]
-    cases += [("waves Hs 0.5 m", from_state(np.array(REST), disturbance=ROUGH))]
+    cases += [("current 0.25 m/s", from_state(REST, disturbance=current(0.25)))]
+    cases += [("waves Hs 0.5 m", from_state(REST, disturbance=ROUGH))]
     both = {"noise": NOISE, "plant": OTHER, "thruster_limits": True}
     variants: dict[str, dict[str, Any]] = {
         "": {},
