@@ -69,19 +69,14 @@ def corner_runs(scenario: Scenario, options: argparse.Namespace) -> tuple[str, l
 
 def both_modes(states: Array, duration: float) -> list[Run]:
     """Return learning runs from states in the game and in waves."""
-    disturbed = {"mode": "disturbed", "duration": duration}
-    games = [
-        Run({"mode": "game"}, "learned", from_state(state, mode="game", duration=duration))
-        for state in states
-    ]
-    return games + [
-        Run(
-            {"mode": "disturbed"},
-            "learned",
-            from_state(state, disturbance=SEA | {"seed": number}, **disturbed),
-        )
-        for number, state in enumerate(states)
-    ]
+    runs = []
+    for number, state in enumerate(states):
+        for mode in ("game", "disturbed"):
+            changes = from_state(state, mode=mode, duration=duration)
+            if mode == "disturbed":
+                changes["disturbance"] = SEA | {"seed": number}
+            runs.append(Run({"mode": mode}, "learned", changes))
+    return runs
 
 
 def dissipation_runs(scenario: Scenario, options: argparse.Namespace) -> tuple[str, list[Run]]:
