@@ -48,32 +48,39 @@ class Run:
 def run_all(scenario: Scenario, runs: Sequence[Run], file: Path, n_workers: int) -> list[Row]:
     """Return a row for each run, those that `file` has from there, and add the others to it.
 
-    The code of the policies is not part of a row's key: remove the file when it has changed.
+    The code of the policies is not part of a row's key: remove the file when it has changed. With no
+    worker nothing is run, and the rows are those of the file.
     """
     common = provenance(scenario, "robustness")["key"]
     keys = [one.key(common) for one in runs]
     known = _read(file)
     waiting = [(key, one) for key, one in zip(keys, runs, strict=True) if key not in known]
-    done = len(runs) - len(waiting)
+    if n_workers > 0:
+        known |= _made(scenario, waiting, file, n_workers)
+    return [one.labels | known[key] for key, one in zip(keys, runs, strict=True) if key in known]
+
+
+def _made(
+    scenario: Scenario, waiting: Sequence[tuple[str, Run]], file: Path, n_workers: int
+) -> dict[str, Row]:
+    """Make runs; return their rows by key, each added to the file when it has ended."""
+    made: dict[str, Row] = {}
     file.parent.mkdir(parents=True, exist_ok=True)
     with (
         file.open("a", encoding="utf-8") as out,
         closing(run_tasks(_worker, scenario, [one for _, one in waiting], n_workers)) as events,
     ):
         for event in events:
-            key = waiting[event.task][0]
+            key, one = waiting[event.task]
             if event.message is None:
-                print(
-                    f"\n{waiting[event.task][1].labels} was given up: {event.failure}", file=sys.stderr
-                )
+                print(f"\n{one.labels} was given up: {event.failure}", file=sys.stderr)
                 continue
-            known[key] = event.message
+            made[key] = event.message
             out.write(json.dumps({"key": key} | event.message) + "\n")
             out.flush()
-            done += 1
-            print(f"\r{done} of {len(runs)} runs", end="", file=sys.stderr, flush=True)
+            print(f"\r{len(made)} of {len(waiting)} runs", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
-    return [one.labels | known[key] for key, one in zip(keys, runs, strict=True) if key in known]
+    return made
 
 
 def _read(file: Path) -> dict[str, Row]:

@@ -54,7 +54,9 @@ def lost(rows: Sequence[Row]) -> str:
 
 
 def spread(values: Sequence[float], form: str = ".3f") -> str:
-    """Return minimum, median and maximum."""
+    """Return minimum, median and maximum; nothing of nothing."""
+    if not values:
+        return ""
     return " / ".join(format(q, form) for q in np.quantile(values, [0.0, 0.5, 1.0]))
 
 
@@ -130,14 +132,14 @@ def print_limits(rows: list[Row]) -> None:
         over = [
             100.0 * ((row["spent"] + row["rest"]) / free[case, policy, row["number"]] - 1.0)
             for row in found
-            if not row["stopped"]
+            if not row["stopped"] and (case, policy, row["number"]) in free
         ]
         saturated = [100.0 * (row["saturated"] or 0.0) for row in found]
         print(
             f"  {case:<22}{limits:>9}  {policy:<10}{len(found):>5}"
             f"{f'{np.median(saturated):.1f} / {max(saturated):.1f}':>29}"
             f"{np.median([row['position_rms'] for row in found]):>9.3f}"
-            f"{spread(over, '.2f') if over else '':>36}  {lost(found)}"
+            f"{spread(over, '.2f'):>36}  {lost(found)}"
         )
 
 
@@ -168,7 +170,9 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=1000, help="random starts a mode")
     parser.add_argument("--duration", type=float, default=8.0, help="of the runs from them [s]")
     parser.add_argument("--runs", type=int, default=200, help="disturbed runs a policy")
-    parser.add_argument("--workers", type=int, default=default_workers())
+    parser.add_argument(
+        "--workers", type=int, default=default_workers(), help="0 prints what is there already"
+    )
     parser.add_argument("--rows", type=Path, default=Path("results/robustness.jsonl"))
     options = parser.parse_args()
     scenario = Scenario.load(options.scenario)
@@ -176,7 +180,7 @@ def main() -> None:
         plan, table = TABLES[name]
         title, runs = plan(scenario, options)
         rows = run_all(scenario, runs, options.rows, options.workers)
-        print(f"{name}: {title}")
+        print(f"{name}: {title}" + ("" if len(rows) == len(runs) else f"; {len(rows)} runs so far"))
         table(rows)
         print(flush=True)
 
