@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -30,9 +29,11 @@ from ..symbolic.game import weight_matrix
 from ..symbolic.riccati import gamma_star
 from ..symbolic.settings import Settings, locate, read_toml, shipped_names, validate
 from ..symbolic.vehicle import Array, Vector3
+from .overrides import override, replace_value
 
 Weight = list[float] | list[list[float]]
 DEFAULT = "bluerov2-heavy"
+STATION = {"vehicle", "vehicle_parameters", "current", "game", "envelope", "basis"}
 
 
 class GameSettings(Settings):
@@ -87,10 +88,12 @@ class Scenario(Settings):
     Attributes
     ----------
     vehicle : a shipped name or the path of a TOML file
+    vehicle_parameters : parameters that replace those of the vehicle's file
     current : known steady current in the earth frame [m/s], balanced by the trim
     """
 
     vehicle: str
+    vehicle_parameters: dict[str, Any] = Field(default_factory=dict)
     current: Vector3 = (0.0, 0.0, 0.0)
     game: GameSettings
     envelope: EnvelopeSettings
@@ -117,8 +120,8 @@ class Scenario(Settings):
         """
         path = locate(name, __package__, "scenarios", "scenario")
         data = read_toml(path)
-        for override in overrides:
-            _override(data, override)
+        for text in overrides:
+            override(data, text)
         scenario = validate(cls, data, f"scenario '{name}'")
         scenario._folder = path.parent
         scenario._require_start()
@@ -139,9 +142,32 @@ class Scenario(Settings):
             data[group] |= keys
         changed = validate(Scenario, data, "scenario")
         changed._folder = self._folder
-        if not {"game", "envelope", "basis"} & set(groups):
-            changed.__dict__["_station_keeping"] = self._station_keeping
+        if not STATION & set(groups):
+            changed.use_station(self._station_keeping)
         return changed
+
+    def with_values(self, values: Mapping[str, Any], where: str = "scenario") -> Scenario:
+        """Return a copy with "section.key" or "section.key[i]" replaced, nothing compiled yet.
+
+        Raises
+        ------
+        InputError
+            If there is no such key or entry, or the value breaks a rule.
+        """
+        data = self.model_dump()
+        for key, value in values.items():
+            replace_value(data, key, value, where)
+        changed = validate(Scenario, data, where)
+        changed._folder = self._folder
+        return changed
+
+    def station_text(self) -> str:
+        """Return the settings that `station_keeping` depends on, as JSON."""
+        return self.model_dump_json(include=STATION)
+
+    def use_station(self, station: StationKeeping) -> None:
+        """Take what another scenario with the same `station_text` has built."""
+        self.__dict__["_station_keeping"] = station
 
     def __reduce__(self) -> tuple[Callable[[str, Path | None], Scenario], tuple[str, Path | None]]:
         """Pickle as JSON and the scenario's folder: nothing of CasADi can be pickled."""
@@ -186,8 +212,24 @@ class Scenario(Settings):
         InputError
             If there is no such vehicle or its file breaks a rule.
         """
-        name = self.simulation.plant
-        return None if name is None else self._load_vehicle(name)
+        name, changes = self.simulation.plant, self.simulation.plant_parameters
+        if name is None:
+            return self.model_vehicle().replaced(changes, "the plant") if changes else None
+        return self._load_vehicle(name).replaced(changes, f"vehicle '{name}'")
+
+    def model_vehicle(self) -> Vehicle:
+        """Return the vehicle that the policies are made for; raises as `plant_vehicle`."""
+        return self._load_vehicle(self.vehicle).replaced(
+            self.vehicle_parameters, f"vehicle '{self.vehicle}'"
+        )
+
+    def file_contents(self) -> list[str]:
+        """Return what is in the user's files of a basis and of initial weights, hexadecimal."""
+        name, separator, _ = self.basis.name.rpartition(":")
+        paths = [self._path(name)] if separator else []
+        if self.learner.weights != "riccati":
+            paths.append(self._path(self.learner.weights))
+        return [path.read_bytes().hex() for path in paths if path.is_file()]
 
     @property
     def initial_state(self) -> Array:
@@ -196,7 +238,7 @@ class Scenario(Settings):
 
     @cached_property
     def _station_keeping(self) -> StationKeeping:
-        model = Model(self._load_vehicle(self.vehicle), self.current)
+        model = Model(self.model_vehicle(), self.current)
         half_widths = np.array(self.envelope.half_widths)
         problem = self._problem(model, half_widths)
         _ = problem.P  # refuses a gamma without stabilising solution
@@ -253,19 +295,3 @@ def restored(text: str, folder: Path | None) -> Scenario:
     scenario = Scenario.model_validate_json(text)
     scenario._folder = folder
     return scenario
-
-
-def _override(data: dict[str, Any], text: str) -> None:
-    key, separator, value = text.partition("=")
-    if not separator or not key.strip():
-        raise InputError(f"--set {text}: write section.key=value, for instance game.gamma=3")
-    try:
-        parsed = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        parsed = value.strip()
-    *groups, last = key.strip().split(".")
-    for group in groups:
-        data = data.setdefault(group, {})
-        if not isinstance(data, dict):
-            raise InputError(f"--set {text}: '{group}' is a value, not a group of settings")
-    data[last] = parsed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -179,6 +179,7 @@ class SimulationSettings(Settings):
     seed : of the envelope states that `compare` adds
     plant : the vehicle that is driven, a shipped name or the path of a TOML file; the scenario's own,
         which the controller is made for, when not given
+    plant_parameters : parameters of the driven vehicle that differ from its file's
     thruster_limits : whether the plant gets what its thrusters can give instead of what is asked for
     noise : on what the policy sees
     observer_bandwidth : of a `DisturbanceObserver` whose estimate is fed forward [1/s]; 0 is none. For
@@ -195,6 +196,7 @@ class SimulationSettings(Settings):
     monitor_period: PositiveFloat = 1.0
     seed: NonNegativeInt = 1
     plant: str | None = None
+    plant_parameters: dict[str, Any] = Field(default_factory=dict)
     thruster_limits: bool = False
     noise: NoiseSettings = NoiseSettings()
     observer_bandwidth: NonNegativeFloat = 0.0

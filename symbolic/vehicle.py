@@ -6,6 +6,7 @@ positive magnitudes: D(ν) ν = (D_l + D_q diag(|ν|)) ν is dissipative.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -122,6 +123,18 @@ class Vehicle(Settings):
         """
         path = locate(name, __package__, "vehicles", "vehicle")
         return validate(cls, read_toml(path), f"vehicle '{name}'")
+
+    def replaced(self, parameters: Mapping[str, object], where: str) -> Vehicle:
+        """Return the vehicle with some parameters replaced; `where` names it in a message.
+
+        Raises
+        ------
+        InputError
+            If there is no such parameter, or the vehicle breaks a rule with it.
+        """
+        if not parameters:
+            return self
+        return validate(Vehicle, self.model_dump(mode="json") | dict(parameters), where)
 
     @field_validator("inertia", "added_mass", mode="before")
     @classmethod
