@@ -13,7 +13,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -123,20 +123,26 @@ class _Pool(Generic[S, T, M]):
         self.setup = setup
         self.shipment = shipment
         self.tasks = tasks
-        self.waiting = deque(range(len(tasks)))
-        self.attempts = [0] * len(tasks)
+        self.n_given = 0  # tasks before this number were given to a worker
+        self.again: deque[int] = deque()
+        self.attempts: Counter[int] = Counter()  # of what is not done
         self.busy: dict[Connection, _Worker[S, T, M]] = {}
 
     def run(self, n_workers: int) -> Iterator[Event[M]]:
         """Yield events until no task is left."""
-        while self.waiting or self.busy:
-            while self.waiting and len(self.busy) < n_workers:
+        while self.is_waiting or self.busy:
+            while self.is_waiting and len(self.busy) < n_workers:
                 with _as_workers_need_it():
                     worker: _Worker[S, T, M] = _Worker(self.setup, self.shipment)
                     self.busy[worker.connection] = worker
                 self._give(worker)
             for connection in wait([*self.busy]):
                 yield from self._listen(self.busy[connection])  # type: ignore[index]
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a task has no worker."""
+        return bool(self.again) or self.n_given < len(self.tasks)
 
     def close(self) -> None:
         """End every worker."""
@@ -145,7 +151,8 @@ class _Pool(Generic[S, T, M]):
         self.busy.clear()
 
     def _give(self, worker: _Worker[S, T, M]) -> None:
-        number = self.waiting.popleft()
+        number = self.again.popleft() if self.again else self.n_given
+        self.n_given = max(self.n_given, number + 1)
         self.attempts[number] += 1
         worker.give(number, self.tasks[number])
 
@@ -161,19 +168,22 @@ class _Pool(Generic[S, T, M]):
             raise InputError(content)
         elif kind == "failed":
             raise RunError(content)
-        elif self.waiting:
-            self._give(worker)
         else:
-            del self.busy[worker.connection]
-            worker.end()
+            del self.attempts[worker.task]
+            if self.is_waiting:
+                self._give(worker)
+            else:
+                del self.busy[worker.connection]
+                worker.end()
 
     def _bury(self, worker: _Worker[S, T, M]) -> Iterator[Event[M]]:
         """Give the task of a dead worker another attempt, or up."""
         del self.busy[worker.connection]
         how = worker.end()
         if self.attempts[worker.task] < ATTEMPTS:
-            self.waiting.appendleft(worker.task)
+            self.again.appendleft(worker.task)
         else:
+            del self.attempts[worker.task]
             reason = f"its process {how}, and {ATTEMPTS} attempts were made"
             yield Event(worker.task, failure=reason)
 
