@@ -24,10 +24,10 @@ COMMANDS = {
     "offline": "solve for the certified offline optimum of the same game",
     "compare": "run both and write figures, tables and an HTML report",
     "check": "list the paper's assumptions and conditions with their numbers",
-    "sweep": "run a scenario over many states or settings (not available yet)",
+    "sweep": "run policies over many states, settings and vehicle parameters, into one table",
     "replay": "run a record again and compare (not available yet)",
 }
-NOT_YET = ("sweep", "replay")
+NOT_YET = ("replay",)
 DEFAULT_SCENARIO = "bluerov2-heavy"
 GAMMAS_HELP = "also the value at these attenuation levels, or at 12 of them: 'grid'"
 
@@ -118,6 +118,8 @@ def parser() -> argparse.ArgumentParser:
             )
         if name == "offline":
             _offline_options(command)
+        if name == "sweep":
+            _sweep_options(command)
         if name == "check":
             _check_options(command)
         if name == "compare":
@@ -195,6 +197,46 @@ def _offline_options(command: argparse.ArgumentParser) -> None:
         metavar="M",
         help="states of their own on which the fit is judged (default: N / 4, at least 10)",
     )
+
+
+def _sweep_options(command: argparse.ArgumentParser) -> None:
+    options: dict[str, tuple[str, str]] = {
+        "--policies": ("NAME,...", "what drives the vehicle (default: learned,linear)"),
+        "--states": ("N|FILE", "N random states of the envelope, or a .npy or CSV file of rows of 12"),
+        "--scales": ("S,S,...", "parts of the envelope; the same as --vary envelope.scale=S,S,..."),
+        "--sampling": ("KIND", "of ranges: random, latin (default) or sobol"),
+        "--samples": ("N", "number of points at which the ranges are sampled"),
+        "--seed": ("N", "of states and samples (default: the scenario's simulation.seed)"),
+        "--workers": ("N", "processes (default: as many as there are cores)"),
+        "--cluster": ("URL", "scheduler of a dask cluster that does the runs, tcp://HOST:8786"),
+        "--records": ("WHICH", "runs of which records are kept: all (default), failed or none"),
+        "--every": ("SECONDS", "between the kept points of a record, 0 for all (default: 0.2)"),
+    }
+    numbers = {"--samples": int, "--seed": int, "--workers": int, "--every": float}
+    words = {"--sampling": ("random", "latin", "sobol"), "--records": ("all", "failed", "none")}
+    defaults = {
+        "--policies": "learned,linear",
+        "--sampling": "latin",
+        "--records": "all",
+        "--every": 0.2,
+    }
+    command.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="KEY=VALUES",
+        help="v1,v2,... takes each value, low:high or low:high:log is sampled; KEY is section.key, "
+        "section.key[i], vehicle.KEY, plant.KEY or either with .factor (repeatable)",
+    )
+    for name, (metavar, text) in options.items():
+        command.add_argument(
+            name,
+            metavar=metavar,
+            help=text,
+            type=numbers.get(name, str),
+            choices=words.get(name),
+            default=defaults.get(name),
+        )
 
 
 def _common_options(command: argparse.ArgumentParser) -> None:

@@ -24,10 +24,10 @@ def solve(options: argparse.Namespace, optima: Optima, stage: str) -> dict[int, 
     """Solve with progress on stderr; return the states that were given up, and why."""
     with progress(options) as tell:
         tell(stage, 0.0)
-        return optima.solve(n_workers(options), _Rate(tell, stage, len(optima.states)))
+        return optima.solve(n_workers(options), Rate(tell, stage, len(optima.states)))
 
 
-class _Rate:
+class Rate:
     """Tells the rate and the time left of many solves."""
 
     def __init__(self, tell: Tell, stage: str, n: int) -> None:

@@ -17,7 +17,7 @@ def initial_states(options: argparse.Namespace, scenario: Scenario) -> list[Arra
     """Return the initial states of the command line, or the scenario's."""
     states = [require_state(_parse(text)) for text in options.state or []]
     if options.states is not None:
-        states += _read(options.states)
+        states += read_states(options.states)
     return states or [scenario.initial_state]
 
 
@@ -31,8 +31,8 @@ def _parse(text: str) -> list[float]:
         ) from None
 
 
-def _read(path: Path) -> list[Array]:
-    """Read rows of 12 numbers from a .npy or CSV file."""
+def read_states(path: Path) -> list[Array]:
+    """Return the rows of 12 numbers of a .npy or CSV file; raises InputError."""
     needed = "give rows of 12 numbers, as .npy or with commas between"
     try:
         table = np.load(path, allow_pickle=False) if path.suffix == ".npy" else _read_csv(path)

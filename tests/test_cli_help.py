@@ -57,7 +57,7 @@ def test_help_of_each_command(command: str, capsys: pytest.CaptureFixture[str]) 
         assert option in answer.out
 
 
-@pytest.mark.parametrize("command", ["sweep", "replay"])
+@pytest.mark.parametrize("command", ["replay"])
 def test_reserved_commands_say_so(command: str, tmp_path: Path) -> None:
     answer = run(command, "--json", cwd=tmp_path)
     assert answer.code == 2
@@ -70,10 +70,10 @@ def test_reserved_commands_say_so(command: str, tmp_path: Path) -> None:
 
 
 def test_the_module_runs_as_the_script_does(tmp_path: Path) -> None:
-    words = [sys.executable, "-m", "stationkeep.cli.main", "sweep"]
+    words = [sys.executable, "-m", "stationkeep.cli.main", "replay"]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 2
-    assert done.stderr == run("sweep", cwd=tmp_path).err
+    assert done.stderr == run("replay", cwd=tmp_path).err
 
 
 def test_commands_of_the_readme_are_commands() -> None:
