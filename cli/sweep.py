@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Generator, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -40,13 +40,11 @@ def run(options: argparse.Namespace) -> int:
         options.out = Path("results") / Path(options.scenario).stem / "sweep"
     folder = output_folder(options)
     started = time.monotonic()
-    with locked(folder):
-        sweep = Sweep(plan, bench, folder)
+    with locked(folder), closing(Sweep(plan, bench, folder)) as sweep:
         resumed = _all_runs(options, sweep, execute)
         csv, table = sweep.write_tables()
         groups = summary(sweep.rows(), [choice.key for choice in plan.choices])
         failed = sum(group["failed"] for group in groups)
-        sweep.journal.close()
     answer: dict[str, Any] = {
         "runs": len(plan),
         "failed": failed,

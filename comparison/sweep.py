@@ -106,6 +106,10 @@ class Sweep:
                     self._keep(run, row, None, lost=True)
                 progress(before + made, made)
 
+    def close(self) -> None:
+        """Force the journal to the disk; raises InputError if that is not possible."""
+        self.journal.close()
+
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of the finished runs in their order."""
         for number in np.flatnonzero(self.places >= 0):

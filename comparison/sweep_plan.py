@@ -167,15 +167,15 @@ class Plan:
         if not self.drawn_or_given:
             return None
         envelope = {key: value for key, value in settings.items() if key.startswith("envelope.")}
-        return self._drawn(json.dumps(envelope), self.states)[state]
+        return tuple(self._drawn(json.dumps(envelope), self.states)[state].tolist())
 
     @cached_property
-    def _drawn(self) -> Callable[[str, int], list[tuple[float, ...]]]:
+    def _drawn(self) -> Callable[[str, int], Array]:
         @lru_cache(maxsize=4)
-        def drawn(envelope: str, n_states: int) -> list[tuple[float, ...]]:
+        def drawn(envelope: str, n_states: int) -> Array:
             settings = varied(self.scenario, json.loads(envelope)).envelope
             half_widths = settings.scale * np.array(settings.half_widths)
-            return [tuple(row) for row in draw_samples(half_widths, n_states, self.seed).tolist()]
+            return draw_samples(half_widths, n_states, self.seed)
 
         return drawn
 

@@ -9,6 +9,7 @@ import time
 import zlib
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from io import FileIO
 from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -93,9 +94,12 @@ class Journal:
         return line
 
     def close(self) -> None:
-        """Force everything to the disk and close the file."""
-        with self._file:
-            os.fsync(self._file.fileno())
+        """Force everything to the disk and close the file; raises as `add`."""
+        try:
+            with self._file:
+                os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._unwritable(error) from None
 
     def _read(self) -> None:
         """Find the lines; end a torn last one, so that the next line begins on its own."""
@@ -170,7 +174,7 @@ def write_netcdf(
     InputError
         If the file can't be written.
     """
-    with written_whole(path) as temporary, temporary.open("w+b") as file:
+    with written_whole(path) as temporary, FileIO(temporary, "w+") as file:
         sink = _Sink(file)
         with h5netcdf.File(sink, "w") as table:
             table.dimensions = {"run": n_rows}
@@ -185,6 +189,8 @@ def write_netcdf(
                 for name, unit in units.items():
                     cells = [row[name] for row in block]
                     table.variables[name][start : start + len(block)] = _column(name, unit, cells)
+                if sink.error is not None:
+                    break
                 start += len(block)
         if sink.error is not None:
             raise sink.error
@@ -213,28 +219,29 @@ class _Sink:
     error : the first failure, to be raised when HDF5 has closed the file
     """
 
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
+    def __init__(self, file: FileIO) -> None:
+        self._file = file  # without a buffer: it would fail in seek, too
         self.error: OSError | None = None
-        self.seek, self.tell, self.read = file.seek, file.tell, file.read
-        self.readinto = file.readinto  # type: ignore[attr-defined]
+        self.seek, self.tell = file.seek, file.tell
+        self.read, self.readinto = file.read, file.readinto
 
     def write(self, content: bytes) -> int:
         """Write, or remember why that was not possible."""
-        if self.error is None:
-            try:
-                return self._file.write(content)
-            except OSError as error:
-                self.error = error
+        left = memoryview(content).cast("B")
+        try:
+            while left and self.error is None:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            self.error = error
         return len(content)
 
-    def truncate(self, size: int | None = None) -> int:
-        """Change the size."""
-        return self._file.truncate(size)
-
-    def flush(self) -> None:
-        """Hand everything to the system, or remember why that was not possible."""
+    def truncate(self, size: int) -> int:
+        """Change the size, or remember why that was not possible."""
         try:
-            self._file.flush()
+            return self._file.truncate(size)
         except OSError as error:
             self.error = self.error or error
+            return size
+
+    def flush(self) -> None:
+        """Do nothing: nothing is held back."""
