@@ -3,7 +3,8 @@
     python benchmarks/sweep.py [speed] [table] [killed] [--runs N] [--duration T] [--seed N]
 
 speed: N runs (learned and linear, default 200 of 20 s) by 1 and 2 processes and 2 workers of a dask
-cluster on this machine; the efficiency of w workers is T_1 / (w T_w), whole commands. table: the table
+cluster on this machine; the efficiency of w workers is T_1 / (w T_w), whole commands, and, where other
+programs share the cores, the same of processor times, C_1 / C_w. table: the table
 of 10,000 runs (made up, not run), written and opened, and how memory grows with the number of runs.
 killed: 1,000 runs of 2 s killed twice at random and resumed, and the same through the cluster, beside
 the undisturbed sweep, row for row, without columns of times.
@@ -18,6 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import argparse
 import csv
 import json
+import resource
 import shutil
 import signal
 import subprocess
@@ -83,25 +85,36 @@ def speed(folder: Path, options: argparse.Namespace) -> None:
     """Print runs per second and efficiencies."""
     states = options.runs // 2
 
-    def seconds(name: str, *more: str, n: int = states) -> float:
-        started = time.perf_counter()
+    def seconds(name: str, *more: str, n: int = states) -> tuple[float, float]:
+        """Return wall and processor time of a sweep."""
+        started, used = time.perf_counter(), children()
         subprocess.run(
             command(n, options.duration, folder / name, *more), check=True, stdout=subprocess.DEVNULL
         )
-        return time.perf_counter() - started
+        return time.perf_counter() - started, children() - used
 
     seconds("warm", n=1)  # compiles
-    one = seconds("one", "--workers", "1")
+    one, cpu_one = seconds("one", "--workers", "1")
     print(f"{options.runs} runs of {options.duration:g} s, learned and linear", flush=True)
     print(f"1 process    {options.runs / one:6.2f} runs/s", flush=True)
-    two = seconds("two", "--workers", "2")
-    print(f"2 processes  {options.runs / two:6.2f} runs/s, efficiency {one / two / 2:.2f}", flush=True)
+    two, cpu_two = seconds("two", "--workers", "2")
+    print(
+        f"2 processes  {options.runs / two:6.2f} runs/s, efficiency {one / two / 2:.2f}, of processor "
+        f"times {cpu_one / cpu_two:.2f}",
+        flush=True,
+    )
     with cluster(folder) as address:
         time.sleep(5.0)  # its workers are there before a sweep begins
-        dask = seconds("dask", "--cluster", address)
+        dask, _ = seconds("dask", "--cluster", address)
     print(
         f"dask, 2      {options.runs / dask:6.2f} runs/s, efficiency {one / dask / 2:.2f}", flush=True
     )
+
+
+def children() -> float:
+    """Return the processor time of the processes that have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def table(folder: Path) -> None:
