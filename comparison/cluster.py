@@ -7,9 +7,11 @@ import logging
 import queue
 import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
+from importlib.metadata import version
 from typing import Any, TypeVar
 
+from ..online.record import versions
 from ..symbolic import InputError, RunError, StationkeepError
 from .pool import Event, Work
 
@@ -30,15 +32,13 @@ def run_on_cluster(
 ) -> Generator[Event[M], None, None]:
     """Work on all tasks on the cluster of this scheduler, and yield what they say.
 
-    Each worker builds what works on tasks for itself, once; a few tasks a thread are with the cluster
-    at any time. What a worker that died was at goes to another one; a task at which the cluster gave up
-    is an event with the reason.
+    Each worker builds what works on tasks for itself, once; a few tasks a thread are under way. What a
+    worker that died was at goes to another one; a task that was given up is an event with the reason.
 
     Raises
     ------
     InputError
-        If dask.distributed is not installed here, nothing answers at the address, or the workers don't
-        have stationkeep.
+        If dask.distributed is not installed, nothing answers, or a worker has another stationkeep.
     RunError
         If the scheduler or the last worker is lost.
     """
@@ -71,50 +71,30 @@ class _Flow:
             threads = self._threads()
             looks = 0 if threads else looks + 1
             if looks > PATIENCE:
-                raise RunError(
-                    f"the cluster {self.address} has no workers any more; what was finished is kept, "
-                    "start workers and run the sweep again"
-                )
+                raise _lost(self.address, "has no workers any more")
             while self.given < len(self.tasks) and len(self.pending) < AHEAD * max(threads, 1):
                 task = self.tasks[self.given]
                 future = self.client.submit(_work, *self.arguments, task, pure=False)
                 self.pending[future] = self.given
                 future.add_done_callback(self.over.put)
                 self.given += 1
-            for future in self._done():
-                yield from self._told(future)
+            with suppress(queue.Empty):
+                yield from self._told(self.over.get(timeout=POLL))
 
     def _threads(self) -> int:
-        try:
+        with suppress(OSError, ValueError, TimeoutError):
             if self.client.status == "running":
                 return sum(self.client.nthreads().values())
-        except (OSError, ValueError, TimeoutError):
-            pass
-        raise self._lost()
-
-    def _done(self) -> list[Any]:
-        """Return the futures that are over, none after a while."""
-        done: list[Any] = []
-        try:
-            done.append(self.over.get(timeout=POLL))
-            while True:
-                done.append(self.over.get_nowait())
-        except queue.Empty:
-            return done
+        raise _lost(self.address, "was lost")
 
     def _told(self, future: Any) -> Iterator[Event[Any]]:
         number = self.pending.pop(future)
         if future.status in ("cancelled", "lost"):
-            raise self._lost()
+            raise _lost(self.address, "was lost")
         try:
             messages = future.result()
         except importlib.import_module("distributed").KilledWorker:
             yield Event(number, failure="its worker was lost, again and again")
-        except ModuleNotFoundError as error:
-            raise InputError(
-                f"the workers of {self.address} have no module '{error.name}'; install the same "
-                "stationkeep there"
-            ) from None
         except StationkeepError:
             raise
         except Exception as error:  # whatever a worker's process could raise
@@ -122,11 +102,12 @@ class _Flow:
         else:
             yield from (Event(number, message) for message in messages)
 
-    def _lost(self) -> RunError:
-        return RunError(
-            f"the scheduler {self.address} was lost; what was finished is kept, start a cluster "
-            "and run the sweep again"
-        )
+
+def _lost(address: str, how: str) -> RunError:
+    return RunError(
+        f"the scheduler {address} {how}; what was finished is kept, start a cluster and run "
+        "the sweep again"
+    )
 
 
 def _work(setup: Callable[[S], Work[T, M]], shipment: S, task: T) -> list[M]:
@@ -153,4 +134,8 @@ def _connected(distributed: Any, address: str) -> Iterator[Any]:
             "'dask scheduler', workers with 'dask worker', and give its address, tcp://HOST:8786"
         ) from None
     with closing(client):
+        ours = versions()["stationkeep_version"]
+        for worker, found in client.run(version, "stationkeep", on_error="return").items():
+            if found != ours:
+                raise InputError(f"the worker {worker} needs stationkeep {ours}, but has: {found}")
         yield client

@@ -136,12 +136,19 @@ def test_a_disk_that_fills_up(user_folder: Path) -> None:
 
 @pytest.mark.slow
 def test_through_a_cluster_with_a_worker_lost_then_the_scheduler(
-    user_folder: Path, started: list[Started]
+    user_folder: Path, capsys: Capture, started: list[Started], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A worker killed mid-run is made up for; without scheduler it ends, and goes on anywhere."""
     (user_folder / "dask").mkdir()
     with cluster(user_folder / "dask") as dask:
         words = ("--states", "30", "--cluster", dask.address)
+        with monkeypatch.context() as patch:
+            patch.setattr(
+                "stationkeep.comparison.cluster.versions", lambda: {"stationkeep_version": "99"}
+            )
+            answer = call(capsys, *QUIET[:3], *SETTINGS, *words)
+        assert answer.code == 2
+        assert "needs stationkeep 99, but has: " in answer.sentence()
         sweep = Started("out", *words)
         started.append(sweep)
         sweep.wait_for(3)
