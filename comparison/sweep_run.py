@@ -187,8 +187,9 @@ def thinned(record: xr.Dataset, every: float) -> xr.Dataset:
     if every <= 0.0:
         return record
     rows = {
-        name: _spaced(record[name].values, spacing)
-        for name, spacing in (("time", every), ("learn_time", LEARNING * every))
+        name: _spaced(record[name].values, every if name == "time" else LEARNING * every)
+        for name in map(str, record.dims)
+        if name == "time" or name.endswith("_time")
     }
     return record.isel(rows).assign_attrs(thinned=every)
 
