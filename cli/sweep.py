@@ -157,8 +157,8 @@ def _print(answer: dict[str, Any], scenario: Scenario) -> None:
     short = sum(group["too_short"] for group in groups)
     if game and short:
         print(
-            f"{short} runs ended with more than a thousandth of their cost still to come (estimated as "
-            "ζ'P ζ): their regret says little, raise simulation.duration"
+            f"{short} of the runs ended with more than a thousandth of the cost still to come, "
+            "estimated as ζ'P ζ: their regret says little, raise simulation.duration"
         )
     print(
         f"{answer['runs']} runs, {answer['failed']} failed, {answer['resumed']} were there already; "
