@@ -86,7 +86,9 @@ def worker(bench: Bench) -> Work[Run, Finished]:
     stations = _Stations()
 
     def work(run: Run) -> Iterator[Finished]:
-        yield _finished(bench, stations, run)
+        with np.errstate(all="ignore"):  # a run that diverges says so in its row
+            finished = _finished(bench, stations, run)
+        yield finished
 
     return work
 

@@ -109,6 +109,7 @@ def test_a_longer_sweep_keeps_what_a_shorter_one_made(user_folder: Path, capsys:
 def test_runs_that_fail_are_rows_with_their_reason(user_folder: Path, capsys: Capture) -> None:
     """γ below its bound, a vehicle that is lost, a step too long to be stable; the rest goes on."""
     words = ("--vary", "game.gamma=0.9,2", "--vary", "simulation.control_period=0.02,1.0")
+    words += tuple(sets("simulation.duration=4"))
     answer = call(capsys, *WORDS, *words)
     assert answer.code == 1
     told = answer.json()
