@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from ..symbolic.compilation import NATIVE_FLAGS, CompilationError, compile_source
-from ..symbolic.kernel import say_once
+from ..symbolic.kernel import WITHOUT_COMPILER, say_once
 from ..symbolic.vehicle import Array
 
 
@@ -37,7 +37,7 @@ def library() -> ctypes.CDLL | None:
     try:
         return _library()
     except CompilationError as error:
-        say_once(f"{error}; the learner uses numpy, about 5 times slower")
+        say_once(f"{error}; {WITHOUT_COMPILER}")
         return None
 
 

@@ -13,7 +13,7 @@ import casadi
 import numpy as np
 
 from .compilation import CompilationError, compile_function
-from .kernel import TOLERANCE, Kernel, say_once
+from .kernel import TOLERANCE, WITHOUT_COMPILER, Kernel, say_once
 from .vehicle import Array
 
 _LOOP = """
@@ -102,7 +102,7 @@ class BatchKernel:
                 )
             return loop
         except CompilationError as error:
-            say_once(f"{error}; using CasADi's virtual machine, about 10 times slower")
+            say_once(f"{error}; {WITHOUT_COMPILER}")
             return None
 
     def _difference(self, loop: ctypes._NamedFuncPointer, n_points: int = 10) -> float:

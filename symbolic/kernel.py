@@ -19,6 +19,7 @@ from .vehicle import Array
 
 logger = logging.getLogger("stationkeep")
 TOLERANCE = 1e-12  # largest norm-relative difference of compiled to symbolic
+WITHOUT_COMPILER = "using CasADi's virtual machine and numpy, 5 to 10 times slower"
 
 
 class Kernel:
@@ -101,7 +102,7 @@ def export(
             kernel, key, hit = external, library.key, library.cache_hit
         except CompilationError as error:
             difference = 0.0
-            say_once(f"{error}; using CasADi's virtual machine, about 10 times slower")
+            say_once(f"{error}; {WITHOUT_COMPILER}")
     described = Export(
         name=function.name(),
         inputs=[_describe(function.name_in(i), function.size_in(i)) for i in range(function.n_in())],
