@@ -184,14 +184,17 @@ class Scenario(Settings):
         return self._station_keeping
 
     def initial_weights(self) -> Array | None:
-        """Return the learner's initial weights, or None for the Riccati solution.
+        """Return the learner's initial weights, or None for `weight_factor` times the Riccati weights.
 
         Raises
         ------
         InputError
-            If the file of weights is not a record with as many weights as the basis.
+            If the file of weights is not a record with as many weights as the basis, or the vehicle
+            whose Riccati solution is asked for breaks a rule.
         """
         learner = self.learner
+        if learner.weights_vehicle is not None:
+            return self._riccati_weights(learner.weights_vehicle) * learner.weight_factor
         if learner.weights == "riccati":
             return None
         path = self._path(learner.weights)
@@ -203,6 +206,12 @@ class Scenario(Settings):
                 "use the record of a run with the same basis"
             )
         return weights
+
+    def _riccati_weights(self, vehicle: str) -> Array:
+        """Return W with W'σ(ζ) = ζ'P ζ for the P of this game on another vehicle, shape (m,)."""
+        station = self._station_keeping
+        model = Model(self._load_vehicle(vehicle), self.current)
+        return station.basis.quadratic_weights(self._problem(model, station.half_widths).P)
 
     def plant_vehicle(self) -> Vehicle | None:
         """Return the vehicle that is driven where it is not the scenario's own, else None.

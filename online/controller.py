@@ -39,7 +39,7 @@ class ControllerScenario(Protocol):
         ...
 
     def initial_weights(self) -> Array | None:
-        """Return the weights to start from, or None for the Riccati solution."""
+        """Return the weights to start from, or None for weight_factor times the Riccati weights."""
         ...
 
 
@@ -51,7 +51,8 @@ class Controller:
     scenario : vehicle, game, basis, learner and samples
     station : x, y, z [m] and heading ψ [rad] to hold, in the earth frame
     learn : False keeps the initial weights (with the default ones, the linear H-infinity policy
-        -R^-1 g(ζ)'P ζ); with a safeguard, only from where they are predicted to cost less than linear
+        -R^-1 g(ζ)'P ζ); with a safeguard, only from where they are predicted to cost less than the
+        reference weights
 
     Attributes
     ----------
@@ -85,20 +86,21 @@ class Controller:
                 "earth frame so that its x axis is the heading to hold, and the current with it"
             )
         self.learn = learn
-        weights = scenario.initial_weights()
+        reference, weights = _start(scenario, self.setup)
         self.learner = Learner(
             self.setup.problem,
             self.setup.basis,
             scenario.learner,
             sample_strategy(scenario.samples, self.setup) if learn else np.zeros((0, 12)),
-            self.setup.riccati_weights,
+            reference,
             weights,
             self.setup.functions,
             scenario.samples,
             self.setup.envelope if learn and scenario.samples.remember else None,
         )
-        # nothing to certify where the frozen weights are the linear policy's own
-        self.certify = not learn and scenario.learner.safeguard and weights is not None
+        # nothing to certify where the frozen weights are the reference's own
+        safeguarded = not learn and scenario.learner.safeguard
+        self.certify = safeguarded and weights is not None and weights is not reference
         self.period = scenario.learner.period
         self._since: float | None = None
         self.last_step: LearnerStep | None = None
@@ -163,6 +165,20 @@ class Controller:
         turned = float(eta[5] - self.station[3])
         zeta[5] = math.atan2(math.sin(turned), math.cos(turned))
         return zeta
+
+
+def _start(scenario: ControllerScenario, setup: StationKeeping) -> tuple[Array, Array | None]:
+    """Return the reference weights, and those to start from, or None for the settings' multiple."""
+    weights, settings = scenario.initial_weights(), scenario.learner
+    if settings.reference == "riccati":
+        return setup.riccati_weights, weights
+    start = setup.riccati_weights * settings.weight_factor if weights is None else weights
+    if not np.any(start):
+        raise InputError(
+            "learner.reference is 'initial', but the initial weights are zero, which leaves the "
+            'projection a ball without points; set learner.reference = "riccati" or start elsewhere'
+        )
+    return start, start
 
 
 def sample_strategy(settings: SampleSettings, setup: StationKeeping) -> SampleStrategy:

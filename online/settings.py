@@ -32,7 +32,7 @@ class LearnerSettings(Settings):
     error : what the critic learns from: `bellman`, the Bellman error (17) at the samples, or `costate`,
         the error of its gradient's policy along predicted trajectories, see `rows.CostateSource`
     safeguard : move the actors only as far as the model predicts no higher cost, and restart them from
-        the Riccati weights where these are predicted to cost less
+        the reference weights where these are predicted to cost less
     horizon : of the predictions [s]; after it the cost is ζ'P ζ
     steps : of the integration over the horizon
     normalizer : weight of a row; `paper` is 1/p as printed, see `critic.row_weights`
@@ -42,12 +42,16 @@ class LearnerSettings(Settings):
     gain_actor_1, gain_actor_2 : η_a1, η_a2 of (20)(21) [1/s]
     forgetting : β of least squares [1/s]
     covariance, covariance_bound : Γ(0) and Γ_max as multiples of the identity
-    leash : strength of the ridge towards the Riccati weights, relative to what the samples know of
+    leash : strength of the ridge towards the reference weights, relative to what the samples know of
         each weight at the start; 0 is none
     period : time between learning steps [s]
     weights : start from the Riccati solution (`riccati`) or from the record of a run (its path)
+    weights_vehicle : whose Riccati solution that is, a shipped name or the path of a TOML file; the
+        scenario's own vehicle when not given
     weight_factor : multiple of those weights to start from
-    weight_bound : projection bound as a multiple of the norm of the Riccati weights
+    reference : the weights that leash, projection and safeguard hold to: `riccati`, those of the
+        scenario's own vehicle, or `initial`, whatever the learner starts from
+    weight_bound : projection bound as a multiple of the norm of the reference weights
     """
 
     rule: Literal["gradient", "least_squares"] = "least_squares"
@@ -67,7 +71,9 @@ class LearnerSettings(Settings):
     leash: NonNegativeFloat = 0.0
     period: PositiveFloat = 0.25
     weights: str = "riccati"
+    weights_vehicle: str | None = None
     weight_factor: float = 1.0
+    reference: Literal["riccati", "initial"] = "riccati"
     weight_bound: Annotated[float, Field(gt=1.0)] = 3.0
 
     @model_validator(mode="after")
@@ -81,6 +87,11 @@ class LearnerSettings(Settings):
             raise ValueError(
                 f"forgetting * period is {self.forgetting * self.period:g}, but must be at most 1 for "
                 "the covariance to stay bounded; learn more often or forget more slowly"
+            )
+        if self.weights_vehicle is not None and self.weights != "riccati":
+            raise ValueError(
+                f"weights_vehicle is '{self.weights_vehicle}' and weights '{self.weights}', but only a "
+                'Riccati solution belongs to a vehicle; leave one out, or set weights = "riccati"'
             )
         return self
 
