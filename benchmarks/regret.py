@@ -1,11 +1,19 @@
 """Regret of the learned policies beside the linear H-infinity policy, over random states, printed.
 
-python benchmarks/regret.py [--states N] [--scales 0.1,0.35] [--duration S] [--cache FILE]
+    python benchmarks/regret.py [--states N] [--scales 0.1,0.35] [--workers N] [--cache DIR]
+    python benchmarks/regret.py --only starts
 
 Regret is (cost - V*) / V* in `game` mode, with ζ'P ζ for what is left at the end of a run and V* from
-the direct solve. States are s × half-widths × U(-1, 1)^12 × U(0.1, 1). A run that ends early counts as
-infinite regret. `online` starts each run from the Riccati weights and is scored while it learns;
-`frozen` uses, without learning, what one run from another state remembered.
+the direct solve. States are s x half-widths x U(-1, 1)^12 x U(0.1, 1), seeded. A run that ends early
+counts as infinite regret. `online` starts each run from the Riccati weights and is scored while it
+learns; `frozen` uses, without learning, what one run from another state remembered; `gradient` is (19)
+as printed. Every ratio is to the linear policy on the same states.
+
+The second form tells what becomes of wrong starts: half of P, the P of a vehicle with half the added
+mass, and zero.
+
+Finished runs are kept in DIR, each under the hash of all that it depends on: what was killed goes on
+where it was.
 """
 
 from __future__ import annotations
@@ -15,118 +23,153 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import argparse
-import json
-import tempfile
-from collections.abc import Callable
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
+from starts import print_starts, print_zero
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.contenders import CONTENDERS
-from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.offline import DirectSolver
-from stationkeep.online import Controller, History, draw_samples, run, save, to_dataset
+from stationkeep.comparison.kept import Keep
+from stationkeep.comparison.lesson import lesson
+from stationkeep.comparison.pool import default_workers
+from stationkeep.comparison.regret import (
+    MOONSHOT,
+    REQUIRED,
+    Case,
+    Row,
+    Summary,
+    regrets,
+    target,
+)
+from stationkeep.online import draw_samples
+from stationkeep.symbolic import StationkeepError
 
 SEED = 20
-Run = Callable[[Scenario], History]
+BETWEEN_NOTES = 10.0  # s
 
 
-class Values:
-    """V* of states, kept in a file if there is one."""
+class Told:
+    """Progress on stderr, now and then, with the time that is left."""
 
-    def __init__(self, scenario: Scenario, file: Path | None) -> None:
-        station = scenario.station_keeping()
-        self._solver = DirectSolver(station.problem, horizon=60.0, n_intervals=30)
-        self._prefix = station.fingerprint
-        self._file = file
-        known = file is not None and file.is_file()
-        self._known: dict[str, float] = json.loads(file.read_text()) if known and file else {}
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self.started = self.shown = time.monotonic()
 
-    def at(self, zeta: np.ndarray) -> float:
-        """Return V*(ζ)."""
-        key = f"{self._prefix[:16]} {' '.join(f'{entry:.12g}' for entry in zeta)}"
-        if key not in self._known:
-            self._known[key] = self._solver.solve(zeta, verify=False).value
-            if self._file is not None:
-                self._file.write_text(json.dumps(self._known))
-        return self._known[key]
+    def __call__(self, there: int, made: int, total: int) -> None:
+        """Tell that `there` of `total` runs are there, `made` of them in this process."""
+        now = time.monotonic()
+        if now - self.shown > BETWEEN_NOTES and there < total:
+            self.shown = now
+            left = (now - self.started) / made * (total - there)
+            print(f"{self.what}: {there}/{total} runs, {left / 60:.1f} min left", file=sys.stderr)
 
 
-def cost(history: History, scenario: Scenario) -> float:
-    """Return the cost of a run in the game, infinite when it ended early."""
-    if history.stopped:
-        return np.inf
-    end = history.zeta[-1]
-    P = scenario.station_keeping().problem.P
-    return float(history.cost[-1] - history.attenuated[-1] + end @ P @ end)
-
-
-def frozen(scenario: Scenario, folder: Path) -> Run:
-    """Learn once, from a state that is not scored, and return runs with what was remembered."""
-    station = scenario.station_keeping()
-    (start,) = draw_samples(station.envelope, 1, SEED + 1)
-    remembering = {"remember": True}
-    record = run(scenario.with_settings(simulation={"initial_state": start}, samples=remembering))
-    path = save(to_dataset(record, {}), folder / f"learned-{scenario.envelope.scale:g}.nc")
-
-    def again(one: Scenario) -> History:
-        kept = one.with_settings(learner={"weights": str(path)})
-        return run(kept, Controller(kept, learn=False))
-
-    return again
-
-
-def table(scale: float, options: argparse.Namespace, folder: Path) -> None:
-    """Print one row a policy, at one scale of the envelope."""
+def with_scale(options: argparse.Namespace, scale: float) -> Scenario:
+    """Return the scenario of the command line at a scale of the envelope."""
     scenario = Scenario.load(options.scenario, [f"envelope.scale={scale}", *options.set])
-    scenario = scenario.with_settings(simulation={"duration": options.duration, "mode": "game"})
-    station = scenario.station_keeping()
-    values = Values(scenario, options.cache)
-    states = draw_samples(station.envelope, options.states, SEED)
-    runs: dict[str, Run] = {
-        "linear": lambda one: run(one, LinearPolicy(station)),
-        "online": run,
-        "frozen": frozen(scenario, folder),
-    }
-    if not options.no_gradient:
-        runs["gradient as printed"] = lambda one: run(CONTENDERS["gradient"].changed(one))
-    linear = np.full(3, np.nan)
-    for name, go in runs.items():
-        regret = np.empty(len(states))
-        speed = []
-        for i, state in enumerate(states):
-            one = scenario.with_settings(simulation={"initial_state": state})
-            history = go(one)
-            regret[i] = cost(history, one) / values.at(state) - 1.0
-            speed.append(history.time[-1] / history.wall_seconds)
-        found = 100.0 * np.quantile(regret, [0.5, 0.9, 1.0], method="higher")
-        linear = found if name == "linear" else linear
-        figures = " / ".join(f"{value:6.3f}" for value in found)
-        shares = " / ".join(f"{value:5.3f}" for value in found / linear)
-        failed = int(np.sum(~np.isfinite(regret)))
-        print(
-            f"{scale:5.2f} {name:20s} {figures} %   of linear {shares}   failed {failed}/{len(states)}"
-            f"   {np.median(speed):4.0f} x real time",
-            flush=True,
-        )
+    return scenario.with_settings(simulation={"duration": options.duration, "mode": "game"})
 
 
-def main() -> None:
+def keep(options: argparse.Namespace, what: str) -> Keep:
+    """Return where runs are kept, and what tells of them."""
+    return Keep(options.cache / "runs.jsonl", options.workers, Told(what))
+
+
+def print_table(options: argparse.Namespace) -> None:
+    """Print one row a policy and scale."""
+    print(
+        f"regret above V* in %, {options.states} states a scale, {options.duration:g} s each;  "
+        "required and moonshot: median / maximum\n"
+        f"{'s':>5} {'policy':<9}{'median':>8}{'90 %':>8}{'max':>8}{'failed':>8}"
+        f"{'of linear: median':>20}{'max':>7}{'  required':<18}{'moonshot':<18}{'real time x':>11}"
+    )
+    for scale in options.scales:
+        scenario = with_scale(options, scale)
+        envelope = scenario.station_keeping().envelope
+        (start,) = draw_samples(envelope, 1, SEED + 1)
+        learned = lesson(scenario, Case("lesson"), start, options.cache)
+        if learned.stopped:
+            print(f"the run that `frozen` learns from ended early: {learned.stopped}", file=sys.stderr)
+        weights = {"learner": {"weights": str(learned.path.resolve())}}
+        cases = [
+            Case("linear", "linear"),
+            Case("online"),
+            Case("frozen", changes=weights, learn=False),
+            Case("gradient", "gradient"),
+        ]
+        cases = [case for case in cases if case.name in ("linear", *options.policies)]
+        states = draw_samples(envelope, options.states, SEED)
+        found = regrets(scenario, cases, states, keep(options, f"s = {scale:g}"))
+        linear = Summary.of(row.regret for row in found["linear"])
+        for name, rows in found.items():
+            print_row(scale, name, rows, linear)
+
+
+def print_row(scale: float, name: str, rows: list[Row], linear: Summary) -> None:
+    """Print the figures of a policy at a scale, and the reasons of its failures on stderr."""
+    one = Summary.of(row.regret for row in rows)
+    figures = "".join(f"{100 * value:8.3f}" for value in (one.median, one.p90, one.largest))
+    line = f"{scale:5.2f} {name:<9}{figures}{one.failed:>8}"
+    if name != "linear":
+        line += f"{one.median / linear.median:20.3f}{one.largest / linear.largest:7.3f}  "
+        for limits in (target(REQUIRED, scale), target(MOONSHOT, scale)):
+            line += f"{' / '.join('met' if m else 'missed' for m in limits.met(one, linear)):<18}"
+    else:
+        line += " " * 65
+    speed = [row.simulated / row.seconds for row in rows if row.seconds > 0.0]
+    print(f"{line.ljust(98)}{np.median(speed):9.0f}", flush=True)
+    for reason in {row.stopped for row in rows if row.stopped}:
+        print(f"  {name}: {reason}", file=sys.stderr)
+
+
+def main() -> int:
     """Read the options and print the tables."""
-    parser = argparse.ArgumentParser(description="regret of learned and linear policies")
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenario", default="bluerov2-heavy")
-    parser.add_argument("--states", type=int, default=100)
-    parser.add_argument("--scales", default="0.1,0.35,0.6,1.0")
-    parser.add_argument("--duration", type=float, default=60.0)
-    parser.add_argument("--cache", type=Path, help="JSON file that keeps V*")
-    parser.add_argument("--no-gradient", action="store_true", help="leave the gradient law out")
+    parser.add_argument("--states", type=int, default=100, help="a scale")
+    parser.add_argument("--scales", type=numbers, default=(0.1, 0.35, 0.6, 1.0), metavar="S,...")
+    parser.add_argument("--policies", type=names, default=POLICIES, metavar="NAME,...", help=HELP)
+    parser.add_argument("--duration", type=float, default=60.0, help="of a run [s]")
+    parser.add_argument("--workers", type=int, default=default_workers())
+    parser.add_argument("--cache", type=Path, default=Path("results/regret"), metavar="DIR")
+    parser.add_argument("--only", choices=("table", "starts"), default="table")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     options = parser.parse_args()
-    print("scale policy               median / 90 % / max regret")
-    with tempfile.TemporaryDirectory() as folder:
-        for scale in options.scales.split(","):
-            table(float(scale), options, Path(folder))
+    try:
+        if options.only == "table":
+            print_table(options)
+        else:
+            scenario = with_scale(options, 0.35)
+            states = draw_samples(scenario.station_keeping().envelope, options.states, SEED)
+            (start,) = draw_samples(scenario.station_keeping().envelope, 1, SEED + 1)
+            print_starts(scenario, states, start, options.cache, lambda what: keep(options, what))
+            print_zero(scenario, states, lambda what: keep(options, what))
+    except StationkeepError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"interrupted; finished runs are in {options.cache}", file=sys.stderr)
+        return 130
+    return 0
+
+
+POLICIES = ("online", "frozen", "gradient")
+HELP = f"beside linear; of {', '.join(POLICIES)}"
+
+
+def numbers(text: str) -> tuple[float, ...]:
+    """Return numbers separated by commas."""
+    return tuple(float(part) for part in text.split(","))
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Return names of policies separated by commas."""
+    given = tuple(text.split(","))
+    if not set(given) <= set(POLICIES):
+        raise argparse.ArgumentTypeError(f"'{text}' must name policies of {', '.join(POLICIES)}")
+    return given
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
