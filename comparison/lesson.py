@@ -11,7 +11,7 @@ from ..online import Controller, load, run, save, to_dataset
 from ..symbolic import InputError
 from ..symbolic.vehicle import Array
 from .kept import key_of
-from .regret import Case
+from .regret import Case, finished
 from .runs import provenance
 from .scenario import Scenario
 
@@ -69,7 +69,7 @@ def _teach(taught: Scenario, path: Path, attributes: dict[str, object]) -> None:
             times.append(t)
             weights.append(memory.weights)
 
-    history = run(taught, controller, note)
+    history = finished(run(taught, controller, note))
     record = to_dataset(history, attributes)
     record["noted"] = (("note_time", "basis"), np.array(weights), {"units": "cost"})
     save(record.assign_coords(note_time=("note_time", np.array(times), {"units": "s"})), path)

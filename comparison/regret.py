@@ -145,6 +145,13 @@ def regrets(
     return {case.name: rows[number :: len(cases)] for number, case in enumerate(cases)}
 
 
+def finished(history: History) -> History:
+    """Return a run that came to its own end; raises KeyboardInterrupt again if the user ended it."""
+    if history.stopped is not None and history.stopped.startswith("interrupted"):
+        raise KeyboardInterrupt
+    return history
+
+
 def game_cost(history: History, P: Array) -> float:
     """Return what a run cost in the game, ζ(T)'P ζ(T) included; infinite if it ended early."""
     if history.stopped:
@@ -178,7 +185,7 @@ def _worker(shipment: tuple[Scenario, tuple[Case, ...]]) -> Work[Task, Result]:
     def work(task: Task) -> Iterator[Result]:
         number, zeta = task
         one = scenarios[number].with_settings(simulation={"initial_state": tuple(zeta.tolist())})
-        history = run(one, cases[number].make(one))
+        history = finished(run(one, cases[number].make(one)))
         value, stopped = None, history.stopped
         try:
             value = optimum(zeta)

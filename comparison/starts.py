@@ -22,7 +22,7 @@ from ..symbolic.vehicle import Array
 from .kept import Keep, Result, key_of
 from .lesson import Lesson
 from .pool import Work
-from .regret import Case, Optimum
+from .regret import Case, Optimum, finished
 from .runs import provenance
 from .scenario import Scenario
 
@@ -157,7 +157,7 @@ def _worker(shipment: tuple[Scenario, Case]) -> Work[Array, Result]:
         start = driving.learner
         before = start.predicted_cost(zeta, start.actor_1, start.actor_2) / optimum(zeta) - 1.0
         both = _Beside(driving, other)
-        history = run(wrong.with_settings(simulation=there), both)
+        history = finished(run(wrong.with_settings(simulation=there), both))
         values = np.array([optimum(seen) for seen, _, _ in both.seen])
         yield {
             "zeta": zeta.tolist(),

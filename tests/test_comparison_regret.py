@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.kept import Keep, key_of
+from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.comparison.pool import Work
 from stationkeep.comparison.regret import (
     MOONSHOT,
@@ -24,7 +25,7 @@ from stationkeep.comparison.regret import (
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import InputError
 
-from .games import quick_scenario
+from .games import Array, quick_scenario
 
 
 def test_failures_are_in_every_quantile() -> None:
@@ -150,6 +151,26 @@ def test_runs_are_kept_and_failures_counted(tmp_path: Path) -> None:
     assert again == found
     entries = [json.loads(line) for line in keep.file.read_text().splitlines()]
     np.testing.assert_array_equal([entry["zeta"] for entry in entries[::3]], states)
+
+
+def test_a_run_that_the_user_ended_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = quick_scenario("simulation.duration=0.2")
+    states = draw_samples(scenario.station_keeping().envelope, 2, 20)
+    keep = Keep(tmp_path / "runs.jsonl")
+    steps = iter(range(1000))
+
+    def interrupted(policy: LinearPolicy, zeta: Array, dt: float) -> Array:
+        if next(steps) == 15:
+            raise KeyboardInterrupt
+        return -policy.gain @ zeta
+
+    with monkeypatch.context() as patch:
+        patch.setattr(LinearPolicy, "control", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            regrets(scenario, [Case("linear", "linear")], states, keep)
+    assert len(keep.file.read_text().splitlines()) == 1
+    rows = regrets(scenario, [Case("linear", "linear")], states, keep)["linear"]
+    assert [row.stopped for row in rows] == [None, None]
 
 
 @pytest.mark.slow
