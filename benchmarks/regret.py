@@ -137,6 +137,8 @@ def main() -> int:
     parser.add_argument("--only", choices=("table", "starts"), default="table")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     options = parser.parse_args()
+    if options.states < 1:
+        parser.error(f"--states is {options.states}, but must be at least 1")
     try:
         if options.only == "table":
             print_table(options)

@@ -94,8 +94,10 @@ class Summary:
 
     @classmethod
     def of(cls, regrets: Iterable[float]) -> Summary:
-        """Return the summary of regrets, failures among them as infinity."""
+        """Return the summary of regrets, failures among them as infinity; infinite if there are none."""
         found = np.array(list(regrets))
+        if not len(found):
+            return cls(0, 0, math.inf, math.inf, math.inf)
         quantiles = np.quantile(found, [0.5, 0.9, 1.0], method="higher")
         return cls(len(found), int(np.sum(~np.isfinite(found))), *(float(q) for q in quantiles))
 
@@ -108,10 +110,10 @@ class Target:
     largest: float
 
     def met(self, found: Summary, linear: Summary) -> tuple[bool, bool]:
-        """Return whether median and maximum are small enough; infinite ones never are."""
+        """Return whether median and maximum are small enough; to infinite ones nothing is."""
         return (
-            math.isfinite(found.median) and found.median <= self.median * linear.median,
-            math.isfinite(found.largest) and found.largest <= self.largest * linear.largest,
+            found.median <= self.median * linear.median < math.inf,
+            found.largest <= self.largest * linear.largest < math.inf,
         )
 
 

@@ -51,8 +51,10 @@ def test_targets_are_parts_of_what_the_linear_policy_loses() -> None:
     for regret, median, largest in ((0.09, True, True), (0.11, False, True), (0.5, False, False)):
         assert limit.met(Summary.of([regret] * 3), linear) == (median, largest)
     assert limit.met(Summary.of([0.0, 0.0, np.inf]), linear) == (True, False)
-    # a linear policy that fails too excuses nobody
-    assert limit.met(Summary.of([np.inf] * 3), Summary.of([np.inf] * 3)) == (False, False)
+    # a linear policy that fails excuses nobody
+    for regret in (0.1, np.inf):
+        assert limit.met(Summary.of([regret]), Summary.of([np.inf])) == (False, False)
+        assert limit.met(Summary.of([regret]), Summary.of([])) == (False, False)
 
 
 @pytest.mark.parametrize(

@@ -74,14 +74,14 @@ def test_costates_find_the_riccati_solution_from_half_of_it() -> None:
     problem, basis, functions = linear_quadratic()
     exact = basis.quadratic_weights(problem.P)
     settings = LearnerSettings(
-        error="costate", safeguard=True, steps=150, gain_actor_1=16.0, gain_actor_2=16.0
+        error="costate", safeguard=True, steps=100, gain_actor_1=16.0, gain_actor_2=16.0
     )
     start = 0.5 * exact
     taught = Learner(problem, basis, settings, np.zeros((0, 12)), start, start, functions)
     zeta = 0.3 * HALF_WIDTHS * np.random.default_rng(3).uniform(-1.0, 1.0, 12)
     value = zeta @ problem.P @ zeta
     assert taught.predicted_cost(zeta, start, start) > 1.01 * value
-    for _ in range(30):
+    for _ in range(12):
         taught.step(zeta, 0.25)
     reached = taught.predicted_cost(zeta, taught.actor_1, taught.actor_2)
     assert reached == pytest.approx(value, rel=1e-4)
@@ -212,6 +212,7 @@ def test_time_within() -> None:
     assert Recovery(times, np.array([4, 2.3, 1, 0]), np.array([2, 2, 1, -1.0]), 5.0).seconds == 2.0
 
 
+@pytest.mark.slow
 def test_a_right_start_has_nothing_to_recover_from(tmp_path: Path) -> None:
     """Beside itself a learner is at no time worse; from P/2 it is, before it learns."""
     scenario = quick_scenario(*COSTATE)
