@@ -94,7 +94,7 @@ class Summary:
 
     @classmethod
     def of(cls, regrets: Iterable[float]) -> Summary:
-        """Return the summary of regrets, failures among them as infinity; infinite if there are none."""
+        """Return the summary of regrets, failures as infinity; infinite if there are none."""
         found = np.array(list(regrets))
         if not len(found):
             return cls(0, 0, math.inf, math.inf, math.inf)
