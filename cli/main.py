@@ -25,9 +25,10 @@ COMMANDS = {
     "compare": "run both and write figures, tables and an HTML report",
     "check": "list the paper's assumptions and conditions with their numbers",
     "sweep": "run policies over many states, settings and vehicle parameters, into one table",
-    "replay": "run a record again and compare (not available yet)",
+    "replay": "run a record again and say whether its numbers come out again",
+    "export": "write a record as a .mat file for MATLAB",
 }
-NOT_YET = ("replay",)
+RECORD_COMMANDS = ("replay", "export")
 DEFAULT_SCENARIO = "bluerov2-heavy"
 GAMMAS_HELP = "also the value at these attenuation levels, or at 12 of them: 'grid'"
 
@@ -63,10 +64,6 @@ def _run(options: argparse.Namespace) -> int:
     from ..symbolic.errors import InputError, StationkeepError
 
     try:
-        if options.command in NOT_YET:
-            raise InputError(
-                f"'{options.command}' is reserved and not available yet; use 'compare' for one scenario"
-            )
         module = importlib.import_module(f".{options.command}", __package__)
         return int(module.run(options))
     except InputError as error:
@@ -109,6 +106,9 @@ def parser() -> argparse.ArgumentParser:
         command = commands.add_parser(
             name, help=purpose, description=purpose[0].upper() + purpose[1:] + "."
         )
+        if name in RECORD_COMMANDS:
+            _record_options(command, name)
+            continue
         _common_options(command)
         if name == "generate":
             command.add_argument(
@@ -239,6 +239,24 @@ def _sweep_options(command: argparse.ArgumentParser) -> None:
         )
 
 
+def _record_options(command: argparse.ArgumentParser, name: str) -> None:
+    command.add_argument("record", type=Path, metavar="RECORD", help="netCDF file of a run (.nc)")
+    if name == "replay":
+        command.add_argument("--out", type=Path, metavar="FILE", help="also keep the new record here")
+        command.add_argument(
+            "--tolerance",
+            type=float,
+            default=1e-6,
+            metavar="X",
+            help="relative difference up to which numbers count as equal (default: 1e-6)",
+        )
+    else:
+        command.add_argument(
+            "--out", type=Path, metavar="FILE", help="file to write (default: RECORD with .mat)"
+        )
+    _output_options(command)
+
+
 def _common_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "scenario",
@@ -257,6 +275,10 @@ def _common_options(command: argparse.ArgumentParser) -> None:
         metavar="SECTION.KEY=VALUE",
         help="change a setting of the scenario (repeatable)",
     )
+    _output_options(command)
+
+
+def _output_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", action="store_true", help="print one JSON object on stdout")
     command.add_argument("--quiet", action="store_true", help="no progress on stderr")
 

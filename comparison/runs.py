@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import platform
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,9 +21,10 @@ from ..online.record import versions
 from ..symbolic import InputError, RunError
 from ..symbolic.vehicle import Array
 from .contenders import contender
+from .files import with_files
 from .scenario import Scenario
 
-FORMAT = 5  # of the records; raise it when what is in them, or how a run is made, changes
+FORMAT = 6  # of the records; raise it when what is in them, or how a run is made, changes
 OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
 
 
@@ -42,17 +44,27 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
     start = scenario.initial_weights() if include is None else None
     parts.append("" if start is None else start.tobytes().hex())
     driven = scenario.plant_vehicle() if include is None else None
-    parts.append("" if driven is None else driven.model_dump_json())
+    plant = "" if driven is None else driven.model_dump_json()
+    parts.append(plant)
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     return {
         "kind": kind,
         "scenario": scenario.model_dump_json(),
         "vehicle": vehicle.model_dump_json(),
+        "plant": plant,
         "mode": scenario.simulation.mode,
         "seed": scenario.samples.seed,
         "functions": functions,
+        "format": FORMAT,
+        "machine": machine(),
         "key": key,
     }
+
+
+def machine() -> str:
+    """Return the kind of machine and the widest vector instructions that numpy found on it."""
+    found = np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", [])
+    return " ".join([platform.system(), platform.machine(), *found[-1:]])
 
 
 def online_record(
@@ -75,7 +87,7 @@ def online_record(
     def make() -> xr.Dataset:
         history = run(scenario, None if policy is None else policy(), progress)
         attributes["wall_seconds"] = history.wall_seconds
-        return to_dataset(history, attributes)
+        return with_files(to_dataset(history, attributes), scenario)
 
     record = reused(path, attributes["key"], make)
     if str(record.attrs["stopped"]).startswith("interrupted"):

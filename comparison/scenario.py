@@ -25,13 +25,16 @@ from ..symbolic import (
     find_function,
     require_state,
 )
+from ..symbolic.basis import BasisFunction
 from ..symbolic.game import weight_matrix
 from ..symbolic.riccati import gamma_star
 from ..symbolic.settings import Settings, locate, read_toml, shipped_names, validate
 from ..symbolic.vehicle import Array, Vector3
+from .files import Files
 from .overrides import override, replace_value
 
 Weight = list[float] | list[list[float]]
+Restore = Callable[[str, Path | None, Files], "Scenario"]
 DEFAULT = "bluerov2-heavy"
 STATION = {"vehicle", "vehicle_parameters", "current", "game", "envelope", "basis"}
 
@@ -104,6 +107,7 @@ class Scenario(Settings):
     offline: OfflineSettings = OfflineSettings()
 
     _folder: Path | None = PrivateAttr(default=None)
+    _files: Files = PrivateAttr(default_factory=Files)
 
     @classmethod
     def load(cls, name: str | Path = DEFAULT, overrides: Sequence[str] = ()) -> Scenario:
@@ -141,7 +145,7 @@ class Scenario(Settings):
         for group, keys in groups.items():
             data[group] |= keys
         changed = validate(Scenario, data, "scenario")
-        changed._folder = self._folder
+        changed._folder, changed._files = self._folder, self._files.without(groups)
         if not STATION & set(groups):
             changed.use_station(self._station_keeping)
         return changed
@@ -169,9 +173,9 @@ class Scenario(Settings):
         """Take what another scenario with the same `station_text` has built."""
         self.__dict__["_station_keeping"] = station
 
-    def __reduce__(self) -> tuple[Callable[[str, Path | None], Scenario], tuple[str, Path | None]]:
-        """Pickle as JSON and the scenario's folder: nothing of CasADi can be pickled."""
-        return restored, (self.model_dump_json(), self._folder)
+    def __reduce__(self) -> tuple[Restore, tuple[str, Path | None, Files]]:
+        """Pickle as JSON, the scenario's folder and files: what is compiled can't be pickled."""
+        return restored, (self.model_dump_json(), self._folder, self._files)
 
     def station_keeping(self) -> StationKeeping:
         """Return vehicle, game and basis, compiled when first used; built once a scenario.
@@ -192,6 +196,8 @@ class Scenario(Settings):
             If the file of weights is not a record with as many weights as the basis, or the vehicle
             whose Riccati solution is asked for breaks a rule.
         """
+        if self._files.weights is not None:
+            return self._files.weights
         learner = self.learner
         if learner.weights_vehicle is not None:
             return self._riccati_weights(learner.weights_vehicle) * learner.weight_factor
@@ -240,6 +246,13 @@ class Scenario(Settings):
             paths.append(self._path(self.learner.weights))
         return [path.read_bytes().hex() for path in paths if path.is_file()]
 
+    def basis_function(self) -> BasisFunction:
+        """Return σ as a function of the scaled state; raises InputError if it can't be found."""
+        if self.basis.name in self._files.bases:
+            return self._files.bases[self.basis.name]
+        name, separator, function = self.basis.name.rpartition(":")
+        return find_function(f"{self._path(name)}:{function}" if separator else function)
+
     @property
     def initial_state(self) -> Array:
         """ζ(0), shape (12,)."""
@@ -251,9 +264,7 @@ class Scenario(Settings):
         half_widths = np.array(self.envelope.half_widths)
         problem = self._problem(model, half_widths)
         _ = problem.P  # refuses a gamma without stabilising solution
-        name, separator, function = self.basis.name.rpartition(":")
-        located = f"{self._path(name)}:{function}" if separator else self.basis.name
-        basis = Basis.build(self.basis.name, find_function(located), problem.zeta, half_widths)
+        basis = Basis.build(self.basis.name, self.basis_function(), problem.zeta, half_widths)
         return StationKeeping(model, problem, basis, half_widths, self.envelope.scale * half_widths)
 
     def _require_start(self) -> None:
@@ -273,6 +284,8 @@ class Scenario(Settings):
             )
 
     def _load_vehicle(self, name: str) -> Vehicle:
+        if name in self._files.vehicles:
+            return self._files.vehicles[name]
         named = "/" not in name and not name.endswith(".toml")
         return Vehicle.load(name if named else self._path(name))
 
@@ -299,8 +312,8 @@ class Scenario(Settings):
         return beside if beside.exists() else path
 
 
-def restored(text: str, folder: Path | None) -> Scenario:
-    """Return the scenario of this JSON, whose relative paths may be meant from `folder`."""
+def restored(text: str, folder: Path | None, files: Files) -> Scenario:
+    """Return the scenario of this JSON; paths may be meant from `folder`, `files` need not be read."""
     scenario = Scenario.model_validate_json(text)
-    scenario._folder = folder
+    scenario._folder, scenario._files = folder, files
     return scenario

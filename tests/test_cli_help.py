@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from stationkeep.cli.main import COMMANDS, parser
+from stationkeep.cli.main import COMMANDS, RECORD_COMMANDS, parser
 
 from .commands import QUICK, Answer, call, files_in, run, script, sets
 
@@ -33,7 +33,7 @@ def test_help_lists_the_commands(tmp_path: Path) -> None:
     answer = run("--help", cwd=tmp_path)
     assert answer.code == 0
     assert answer.err == ""
-    for command in ("generate", "online", "offline", "compare", "check", "sweep", "replay"):
+    for command in COMMANDS:
         assert re.search(rf"^ +{command} +\w+", answer.out, re.MULTILINE)
 
 
@@ -53,20 +53,9 @@ def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
 def test_help_of_each_command(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     answer = call(capsys, command, "--help")
     assert answer.code == 0
-    for option in ("--out", "--set", "--json", "--quiet", "bluerov2-heavy"):
+    given = ("RECORD",) if command in RECORD_COMMANDS else ("--set", "bluerov2-heavy")
+    for option in ("--out", "--json", "--quiet", *given):
         assert option in answer.out
-
-
-@pytest.mark.parametrize("command", ["replay"])
-def test_reserved_commands_say_so(command: str, tmp_path: Path) -> None:
-    answer = run(command, "--json", cwd=tmp_path)
-    assert answer.code == 2
-    assert answer.out == ""
-    text = answer.sentence()
-    assert command in text
-    assert "not available" in text
-    assert "compare" in text
-    assert files_in(tmp_path) == []
 
 
 def test_the_module_runs_as_the_script_does(tmp_path: Path) -> None:
