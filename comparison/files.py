@@ -77,8 +77,8 @@ def files_of(record: xr.Dataset, scenario: Scenario) -> Files:
         raise InputError(f"the record has no attribute {error}; make it again") from None
     except RuntimeError:
         raise InputError(
-            "the basis in the record can't be read by this version of CasADi; use the one that wrote it "
-            f"({record.attrs.get('casadi_version', 'unknown')})"
+            "the basis in the record can't be read by this version of CasADi; use the one that wrote "
+            f"it ({record.attrs.get('casadi_version', 'unknown')})"
         ) from None
     weights = np.array(record[WEIGHTS].values, dtype=np.float64) if WEIGHTS in record else None
     return Files(vehicles, bases, weights)

@@ -27,6 +27,8 @@ MAY_IMPORT = {
 }
 SOURCES = [path for folder in MAY_IMPORT for path in sorted((ROOT / folder).rglob("*.py"))]
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+# the file that may import what only an extra installs
+ADAPTERS = {"control": "comparison/control_adapter.py", "gymnasium": "comparison/gym_adapter.py"}
 
 
 def name_of(path: Path) -> str:
@@ -104,7 +106,22 @@ def test_every_import_is_a_declared_dependency() -> None:
     declared = {re.split(r"[^A-Za-z0-9_-]", line)[0] for line in project["dependencies"]}
     used = {module.split(".")[0] for path in SOURCES for module in imported(path)}
     foreign = used - set(sys.stdlib_module_names) - {"stationkeep"}
-    assert foreign == declared
+    assert foreign - declared == set(ADAPTERS)
+    assert declared <= foreign
+    extras = project["optional-dependencies"]
+    assert [re.split(r"\W", line)[0] for name in ("control", "gym") for line in extras[name]] == [
+        *ADAPTERS
+    ]
+    assert {*extras["control"], *extras["gym"]} <= set(extras["test"])
+
+
+def test_what_only_an_extra_installs_is_imported_by_its_adapter_alone() -> None:
+    for path in SOURCES:
+        packages = {module.split(".")[0] for module in imported(path)}
+        for package in packages & set(ADAPTERS):
+            assert name_of(path) == ADAPTERS[package]
+        names = {module.rpartition(".")[2] for module in imported(path)}
+        assert not names & {"control_adapter", "gym_adapter"}, f"{name_of(path)} imports an adapter"
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=name_of)
