@@ -15,7 +15,7 @@ from ..comparison.report import write_report
 from ..comparison.report_tables import certificate, summary, too_short, verdict
 from ..comparison.style import Page
 from ..symbolic import InputError
-from .output import load_scenario, output_folder, print_json, print_table, progress
+from .output import Tell, load_scenario, output_folder, print_json, print_table, progress
 
 
 def run(options: argparse.Namespace) -> int:
@@ -34,12 +34,25 @@ def run(options: argparse.Namespace) -> int:
             tell("figures", i / len(pages))
             draw_all(comparison, page)
         tell("report", 0.0)
+        film = _film(options, comparison, folder / "figures", tell)
         report = write_report(folder / "report.html", comparison, *pages, _commands(options))
     if options.json:
-        print_json(_answer(comparison, pages[0].files, report))
+        print_json(_answer(comparison, pages[0].files, report) | {"animation": film})
     else:
         _print(comparison, report)
+        if film is not None:
+            print(f"animation: {film}")
     return 1 if comparison.faults else 0
+
+
+def _film(options: argparse.Namespace, comparison: Comparison, folder: Path, tell: Tell) -> Path | None:
+    """Write the film of the learned run beside the optimum, if it is asked for."""
+    if not options.animation:
+        return None
+    from ..comparison.animation import animate
+
+    tell("animation", 0.0)
+    return animate(folder, comparison.records["learned"], comparison.optimal)
 
 
 def _answer(comparison: Comparison, figures: dict[str, Path], report: Path) -> dict[str, Any]:

@@ -141,6 +141,11 @@ def _compare_options(command: argparse.ArgumentParser) -> None:
         metavar="STATE,STATE",
         help="draw the Bellman error over these two states (default: x,y)",
     )
+    command.add_argument(
+        "--animation",
+        action="store_true",
+        help="also a film of learned beside optimal, MP4 with ffmpeg, else GIF",
+    )
     _workers_option(command)
 
 
