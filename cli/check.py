@@ -16,7 +16,7 @@ from ..comparison.theory import require_run, theory
 from ..online import load
 from ..symbolic import InputError
 from ..symbolic.settings import validate
-from .main import DEFAULT_SCENARIO
+from .options import DEFAULT_SCENARIO
 from .output import load_scenario, output_folder, print_json, print_table, progress, write_json
 
 

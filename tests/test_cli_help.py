@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from stationkeep.cli.main import COMMANDS, RECORD_COMMANDS, parser
 
-from .commands import QUICK, Answer, call, files_in, run, script, sets
+from .commands import QUICK, Answer, call, run, script, sets
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 HEAVY = ("casadi", "numpy", "scipy", "xarray", "pydantic", "matplotlib", "rich")

@@ -88,7 +88,7 @@ def test_leaving_chi_ends_the_episode_and_costs_what_staying_there_would() -> No
     game = quick_scenario(CALM, "simulation.duration=60")
     env = StationKeepingEnv(game)
     state = np.zeros(12)
-    state[0], state[6] = 3.99, 0.9
+    state[0], state[6] = 7.99, 0.9
     env.reset(seed=0, options={"state": state})
     total, terminated = 0.0, False
     while not terminated:
@@ -96,7 +96,7 @@ def test_leaving_chi_ends_the_episode_and_costs_what_staying_there_would() -> No
         total += reward
         assert not truncated
     assert info["stopped"]
-    assert abs(info["zeta"][0]) > 4.0, "chi is 2, the half-width 2 m"
+    assert abs(info["zeta"][0]) > 8.0, "chi is 4, the half-width 2 m"
     assert observation[0] == pytest.approx(info["zeta"][0] / 2.0, rel=1e-6)
     rate = info["zeta"] @ game.station_keeping().game.Q @ info["zeta"]
     assert -total == pytest.approx(info["cost"] + rate * (60.0 - info["time"]))
