@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -15,62 +14,24 @@ from pathlib import Path
 
 from stationkeep.comparison.sweep_run import TIMES
 
-from .commands import QUICK, Answer, script, sets
+from .commands import QUICK, script, sets
+from .processes import Group
 
 POLICIES = ("--policies", "learned,linear")
 SETTINGS = (*POLICIES, *sets(*QUICK))
 
 
-class Started:
+class Started(Group):
     """A sweep that was started."""
 
     def __init__(self, out: str, *more: str) -> None:
-        self.folder = Path(out)
         words = [script(), "sweep", "--quiet", "--json", "--out", out, *SETTINGS, *more]
-        self.process = subprocess.Popen(
-            words,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-            start_new_session=True,
-        )
+        super().__init__(words, Path(out))
 
     def finished(self) -> int:
         """Return the number of lines of the journal."""
         journal = self.folder / "sweep.journal"
         return journal.read_bytes().count(b"\n") if journal.is_file() else 0
-
-    def wait_for(self, runs: int, timeout: float = 90.0) -> None:
-        """Wait until that many runs are finished; the sweep must not have ended by then."""
-        end = time.monotonic() + timeout
-        while self.finished() < runs:
-            assert self.process.poll() is None, self.process.communicate()
-            assert time.monotonic() < end
-            time.sleep(0.01)
-
-    def workers(self) -> list[int]:
-        """Return the process numbers of the workers."""
-        found = []
-        for path in Path("/proc").glob("[0-9]*/stat"):
-            try:
-                parent = int(path.read_text().rpartition(")")[2].split()[1])
-                command = (path.parent / "cmdline").read_bytes()
-            except (OSError, IndexError):
-                continue
-            if parent == self.process.pid and b"spawn_main" in command:
-                found.append(int(path.parent.name))
-        return found
-
-    def kill(self) -> None:
-        """Kill everything at once, as a machine that is switched off does."""
-        os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.communicate()
-
-    def answer(self, timeout: float = 240.0) -> Answer:
-        """Wait for the end."""
-        out, err = self.process.communicate(timeout=timeout)
-        return Answer(self.process.returncode, out, err)
 
 
 def table(folder: str | Path) -> list[dict[str, str]]:

@@ -6,7 +6,6 @@ import csv
 import json
 import os
 import signal
-import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,8 +16,9 @@ import pytest
 from stationkeep.comparison.lock import NAME, locked
 from stationkeep.online import load
 
-from .commands import LOOSE, QUICK, Answer, call, files_in, script, sets
+from .commands import LOOSE, QUICK, call, files_in, script, sets
 from .games import HALF_WIDTHS, Array
+from .processes import Group
 
 Capture = pytest.CaptureFixture[str]
 TINY = (
@@ -42,55 +42,16 @@ def user_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-class Run:
-    """`offline` on a file of states in a process group of its own."""
+class Run(Group):
+    """`offline` on a file of states."""
 
     def __init__(self, states: str, out: str, *more: str) -> None:
-        self.folder = Path(out)
         words = [script(), "offline", "--quiet", "--json", "--states", states, "--out", out]
-        self.process = subprocess.Popen(
-            [*words, *SETTINGS, *more],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            encoding="utf-8",
-            start_new_session=True,
-        )
+        super().__init__([*words, *SETTINGS, *more], Path(out))
 
-    def records(self) -> int:
+    def finished(self) -> int:
         """Return the number of records that are there."""
         return len(list(self.folder.glob("optimal-*.nc")))
-
-    def wait_for(self, records: int, timeout: float = 60.0) -> None:
-        """Wait until that many records are there; the run must not have ended by then."""
-        end = time.monotonic() + timeout
-        while self.records() < records:
-            assert self.process.poll() is None, self.process.communicate()
-            assert time.monotonic() < end
-            time.sleep(0.01)
-
-    def workers(self) -> list[int]:
-        """Return the process numbers of the workers."""
-        found = []
-        for path in Path("/proc").glob("[0-9]*/stat"):
-            try:
-                parent = int(path.read_text().rpartition(")")[2].split()[1])
-                command = (path.parent / "cmdline").read_bytes()
-            except (OSError, IndexError):
-                continue
-            if parent == self.process.pid and b"spawn_main" in command:
-                found.append(int(path.parent.name))
-        return found
-
-    def kill(self) -> None:
-        """Kill everything at once, as a machine that is switched off does."""
-        os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.communicate()
-
-    def answer(self, timeout: float = 240.0) -> Answer:
-        """Wait for the end."""
-        out, err = self.process.communicate(timeout=timeout)
-        return Answer(self.process.returncode, out, err)
 
 
 @pytest.fixture
@@ -177,12 +138,12 @@ def test_killed_at_random_moments_again_and_again(
         run = Run("states.npy", "out", "--workers", str(rng.integers(1, 4)))
         started.append(run)
         if kill > 0:
-            run.wait_for(run.records() + int(rng.integers(1, 4)))
+            run.wait_for(run.finished() + int(rng.integers(1, 4)))
         time.sleep(float(rng.uniform(0.0, 0.5)))
         assert run.process.poll() is None
         run.kill()
         assert not (user_folder / "out" / "offline.json").exists()
-    assert 4 <= run.records() < 24
+    assert 4 <= run.finished() < 24
     last = Run("states.npy", "out", "--workers", "2")
     started.append(last)
     assert last.answer().code == 0
