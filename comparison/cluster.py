@@ -58,7 +58,7 @@ class _Flow:
 
     def __init__(self, client: Any, address: str, arguments: tuple[Any, Any], tasks: Any) -> None:
         self.client, self.address = client, address
-        self.arguments = arguments
+        self.arguments = (versions()["stationkeep_version"], *arguments)
         self.tasks = tasks
         self.given = 0
         self.pending: dict[Any, int] = {}
@@ -110,8 +110,16 @@ def _lost(address: str, how: str) -> RunError:
     )
 
 
-def _work(setup: Callable[[S], Work[T, M]], shipment: S, task: T) -> list[M]:
-    """Work on a task in a worker's process; one at a time, since CasADi knows nothing of threads."""
+def _work(needed: str, setup: Callable[[S], Work[T, M]], shipment: S, task: T) -> list[M]:
+    """Work on a task in a worker's process; one at a time, since CasADi knows nothing of threads.
+
+    Each worker looks at its own version: it may have joined when others were long at work.
+    """
+    if version("stationkeep") != needed:
+        address = importlib.import_module("distributed").get_worker().address
+        raise InputError(
+            f"the worker {address} needs stationkeep {needed}, but has: {version('stationkeep')}"
+        )
     config = importlib.import_module("dask.config")
     # xarray would ask the scheduler for a lock on every file that it writes in a worker
     with _building, config.set(scheduler="synchronous"):
@@ -134,8 +142,4 @@ def _connected(distributed: Any, address: str) -> Iterator[Any]:
             "'dask scheduler', workers with 'dask worker', and give its address, tcp://HOST:8786"
         ) from None
     with closing(client):
-        ours = versions()["stationkeep_version"]
-        for worker, found in client.run(version, "stationkeep", on_error="return").items():
-            if found != ours:
-                raise InputError(f"the worker {worker} needs stationkeep {ours}, but has: {found}")
         yield client
