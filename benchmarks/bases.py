@@ -30,8 +30,9 @@ import numpy as np
 from regret import SEED, Run, cost, frozen
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.ideal import Fit, fit, ideal_record
+from stationkeep.comparison.metrics import GameValue
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.offline import DirectSolver, ErrorSize, OfflineSolver, Pairs
+from stationkeep.offline import ErrorSize, OfflineSolver, Pairs
 from stationkeep.online import Controller, History, draw_samples, run, save
 from stationkeep.symbolic import RunError
 
@@ -50,10 +51,8 @@ class Reference:
         station = scenario.station_keeping()
         solver = OfflineSolver(station.problem, scenario.offline)
         self.states = draw_samples(station.envelope, n_states, SEED)
-        quick = DirectSolver(
-            station.problem, horizon=60.0, n_intervals=16, degree=6, grading=6, method="newton"
-        )
-        found = [quick.solve(z, verify=False) for z in self.states]
+        quick = GameValue(station)
+        found = [quick.solution(z) for z in self.states]
         self.values = np.array([solution.value for solution in found])
         kept = []
         for i, zeta in enumerate(self.states):
@@ -66,7 +65,7 @@ class Reference:
                 self.values[i] = solution.value
         self.certified = Pairs(*(np.array(column) for column in zip(*kept, strict=True)))
         starts = draw_samples(station.envelope, n_training, SEED + 2)
-        solved = [quick.solve(z, verify=False) for z in starts]
+        solved = [quick.solution(z) for z in starts]
         values, costates = [s.value for s in solved], [s.costate for s in solved]
         self.training = Pairs(starts, np.array(values), np.array(costates))
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +12,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from stationkeep.comparison import Scenario
+from stationkeep.comparison.kept import Keep, key_of
 from stationkeep.comparison.metrics import GameValue, dissipation_margin, run_metrics
-from stationkeep.comparison.pool import Work, run_tasks
+from stationkeep.comparison.pool import Work
 from stationkeep.comparison.runs import contender_record, provenance
 from stationkeep.symbolic import RunError
 
@@ -41,58 +40,32 @@ class Run:
         """Return the hash of what the run depends on."""
         plant = str(self.changes.get("plant", ""))
         content = Path(plant).read_text(encoding="utf-8") if plant.endswith(".toml") else plant
-        text = json.dumps([common, self.policy, self.changes, content], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return key_of(json.dumps([common, self.policy, self.changes, content], sort_keys=True))
 
 
 def run_all(scenario: Scenario, runs: Sequence[Run], file: Path, n_workers: int) -> list[Row]:
     """Return a row for each run, those that `file` has from there, and add the others to it.
 
-    The code of the policies is not part of a row's key: remove the file when it has changed. With no
-    worker nothing is run, and the rows are those of the file.
+    With no worker nothing is run, and the rows are those of the file. A run that was given up has none.
     """
     common = provenance(scenario, "robustness")["key"]
     keys = [one.key(common) for one in runs]
-    known = _read(file)
-    waiting = [(key, one) for key, one in zip(keys, runs, strict=True) if key not in known]
+    keep = Keep(file, n_workers, _told)
     if n_workers > 0:
-        known |= _made(scenario, waiting, file, n_workers)
-    return [one.labels | known[key] for key, one in zip(keys, runs, strict=True) if key in known]
+        found = keep.results(_worker, scenario, runs, keys)
+        print(file=sys.stderr)
+    else:
+        known = keep.known()
+        found = [known.get(key, {"failure": ""}) for key in keys]
+    for one, row in zip(runs, found, strict=True):
+        if row.get("failure"):
+            print(f"{one.labels} was given up: {row['failure']}", file=sys.stderr)
+    return [one.labels | row for one, row in zip(runs, found, strict=True) if "failure" not in row]
 
 
-def _made(
-    scenario: Scenario, waiting: Sequence[tuple[str, Run]], file: Path, n_workers: int
-) -> dict[str, Row]:
-    """Make runs; return their rows by key, each added to the file when it has ended."""
-    made: dict[str, Row] = {}
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with (
-        file.open("a", encoding="utf-8") as out,
-        closing(run_tasks(_worker, scenario, [one for _, one in waiting], n_workers)) as events,
-    ):
-        for event in events:
-            key, one = waiting[event.task]
-            if event.message is None:
-                print(f"\n{one.labels} was given up: {event.failure}", file=sys.stderr)
-                continue
-            made[key] = event.message
-            out.write(json.dumps({"key": key} | event.message) + "\n")
-            out.flush()
-            print(f"\r{len(made)} of {len(waiting)} runs", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    return made
-
-
-def _read(file: Path) -> dict[str, Row]:
-    """Return the rows of a file by key; a line that a killed process left half written is none."""
-    if not file.is_file():
-        return {}
-    text = file.read_text(encoding="utf-8")
-    if text and not text.endswith("\n"):
-        text = text[: text.rfind("\n") + 1]
-        file.write_text(text, encoding="utf-8")
-    found = [json.loads(line) for line in text.splitlines()]
-    return {row.pop("key"): row for row in found}
+def _told(there: int, made: int, total: int) -> None:
+    """Show the number of rows that are there."""
+    print(f"\r{there} of {total} runs", end="", file=sys.stderr, flush=True)
 
 
 def _worker(scenario: Scenario) -> Work[Run, Row]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from closed_loops import Run
 from stationkeep.comparison import Scenario
-from stationkeep.offline import DirectSolver
+from stationkeep.comparison.metrics import GameValue
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import Vehicle
 
@@ -52,10 +52,10 @@ def corner_runs(scenario: Scenario, options: argparse.Namespace) -> tuple[str, l
     """The corners of the envelope from which the optimum goes farthest, of 1000 seeded ones."""
     problem = scenario.station_keeping().problem
     signs = np.random.default_rng(SEED).choice([-1.0, 1.0], (1000, 12))
-    solver = DirectSolver(problem, horizon=60.0, n_intervals=16, degree=6, grading=6.0)
+    value = GameValue(scenario.station_keeping())
 
     def peak(state: Array) -> float:
-        path = solver.solve(state, verify=False).trajectory
+        path = value.solution(state).trajectory
         return float(np.abs(path.states / problem.scale).max())
 
     peaks = np.array([peak(state) for state in signs * problem.scale])

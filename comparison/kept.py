@@ -56,7 +56,7 @@ class Keep:
         InputError
             If the file can't be written.
         """
-        kept = self._read()
+        kept = self.known()
         missing = [number for number, key in enumerate(keys) if key not in kept]
         there = len(keys) - len(missing)
         todo = [tasks[number] for number in missing]
@@ -72,7 +72,7 @@ class Keep:
                     self.progress(there + made, made, len(keys))
         return [kept[key] for key in keys]
 
-    def _read(self) -> dict[str, Result]:
+    def known(self) -> dict[str, Result]:
         """Return what is kept, by key, without a line that a killed process left unfinished."""
         kept = {}
         for line in self.file.read_bytes().splitlines() if self.file.is_file() else ():

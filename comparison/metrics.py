@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..offline import DirectSolver
+from ..offline import DirectSolution, DirectSolver
 from ..symbolic import StationKeeping, Vehicle
 from ..symbolic.vehicle import Array
 
@@ -153,5 +153,9 @@ class GameValue:
 
     def with_costate(self, zeta: Array) -> tuple[float, Array]:
         """Return V*(ζ) and its gradient, (n,); raises RunError where the solver does not converge."""
-        solution = self._solver.solve(zeta, verify=False)
-        return solution.value, solution.costate
+        found = self.solution(zeta)
+        return found.value, found.costate
+
+    def solution(self, zeta: Array) -> DirectSolution:
+        """Return the solve behind V*(ζ); raises RunError where the solver does not converge."""
+        return self._solver.solve(zeta, verify=False)

@@ -104,7 +104,7 @@ class Controller:
         self.period = scenario.learner.period
         self._since: float | None = None
         self.last_step: LearnerStep | None = None
-        self.zeta = np.zeros(12)
+        self.zeta, self._J = np.zeros(12), np.eye(6)
         self.u_control = np.zeros(6)
         self.u_disturbance = np.zeros(6)
 
@@ -137,6 +137,7 @@ class Controller:
         if not (np.isfinite(pose).all() and np.isfinite(rate).all()):
             raise InputError("eta and eta_dot must be finite, but contain NaN or infinity")
         self.zeta = require_state(self._error(pose, rate))
+        (self._J,) = self.setup.model.kinematics(self.zeta[:6])
         self.last_step = None
         since = self.period if self._since is None else self._since + dt
         if self.learn and since >= self.period * (1.0 - 1e-9):
@@ -151,8 +152,7 @@ class Controller:
 
     def body_wrench(self, u: Array) -> Array:
         """Return τ = J(η)'u of an earth-frame force u at the last state, shape (6,)."""
-        (J,) = self.setup.model.kinematics(self.zeta[:6])
-        return np.asarray(J.T @ u)
+        return np.asarray(self._J.T @ u)
 
     def _error(self, eta: Array, eta_dot: Array) -> Array:
         """Return the state relative to the station, in a frame turned by the station's heading.
