@@ -24,17 +24,22 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import argparse
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from regret import SEED, Run, cost, frozen
+from regret import SEED
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.ideal import Fit, fit, ideal_record
+from stationkeep.comparison.lesson import lesson
 from stationkeep.comparison.metrics import GameValue
 from stationkeep.comparison.policies import LinearPolicy
+from stationkeep.comparison.regret import Case, Summary, finished, game_cost
 from stationkeep.offline import ErrorSize, OfflineSolver, Pairs
 from stationkeep.online import Controller, History, draw_samples, run, save
 from stationkeep.symbolic import RunError
+
+Run = Callable[[Scenario], History]
 
 
 class Reference:
@@ -72,12 +77,12 @@ class Reference:
 
 def regret(scenario: Scenario, reference: Reference, go: Run) -> str:
     """Return median, 90 % and largest regret in per cent."""
-    found = []
+    P, found = scenario.station_keeping().problem.P, []
     for zeta, value in zip(reference.states, reference.values, strict=True):
         one = scenario.with_settings(simulation={"initial_state": zeta})
-        found.append(cost(go(one), one) / value - 1.0)
-    quantiles = 100.0 * np.quantile(found, [0.5, 0.9, 1.0], method="higher")
-    return "/".join(f"{value:6.3f}" for value in quantiles)
+        found.append(game_cost(finished(go(one)), P) / value - 1.0)
+    one_of = Summary.of(found)
+    return "/".join(f"{100.0 * value:6.3f}" for value in (one_of.median, one_of.p90, one_of.largest))
 
 
 def linear_run(scenario: Scenario) -> History:
@@ -92,6 +97,18 @@ def as_they_are(scenario: Scenario, found: Fit, reference: Reference, folder: Pa
 
     def go(one: Scenario) -> History:
         kept = one.with_settings(learner={"weights": str(path), "safeguard": False})
+        return run(kept, Controller(kept, learn=False))
+
+    return go
+
+
+def frozen(scenario: Scenario, folder: Path) -> Run:
+    """Learn once, from a state that is not scored, and return runs with what was remembered."""
+    (start,) = draw_samples(scenario.station_keeping().envelope, 1, SEED + 1)
+    path = lesson(scenario, Case("lesson"), start, folder).path
+
+    def go(one: Scenario) -> History:
+        kept = one.with_settings(learner={"weights": str(path)})
         return run(kept, Controller(kept, learn=False))
 
     return go
