@@ -184,12 +184,12 @@ class _Loop:
 
     def _out_of_bounds(self) -> str | None:
         zeta, settings = self.state.zeta, self.settings
-        if not np.isfinite(zeta).all():
+        far = np.abs(zeta) / self.station.half_widths
+        if not math.isfinite(far.max()):
             return "the state is not finite"
         pitch = math.degrees(zeta[4])
         if abs(pitch) > settings.pitch_limit:
             return f"the pitch left ±{settings.pitch_limit:g} deg ({pitch:.1f} deg)"
-        far = np.abs(zeta) / self.station.half_widths
         if far.max() > settings.chi:
             name = STATE_NAMES[int(far.argmax())]
             return f"the state left chi ({name} is {far.max():.2f} half-widths, over {settings.chi:g})"

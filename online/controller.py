@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..symbolic import InputError, StationKeeping, require_state
+from ..symbolic import InputError, StationKeeping, require_pitch
 from ..symbolic.vehicle import Array
 from .learner import Learner, LearnerStep
 from .samples import (
@@ -79,7 +79,10 @@ class Controller:
         self.setup = scenario.station_keeping()
         self.station = np.array(station, dtype=float)
         c, s = np.cos(station[3]), np.sin(station[3])
-        self._turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        self._turn = np.eye(12)
+        self._turn[:2, :2] = self._turn[6:8, 6:8] = [[c, s], [-s, c]]
+        self._origin = np.zeros(12)
+        self._origin[[0, 1, 2, 5]] = self.station
         if station[3] != 0.0 and any(self.setup.model.current):
             raise InputError(
                 "a known current can't be combined with a station heading other than 0; turn the "
@@ -134,9 +137,11 @@ class Controller:
             raise InputError(
                 f"eta and eta_dot must have 6 entries each, but have {pose.shape} and {rate.shape}"
             )
-        if not (np.isfinite(pose).all() and np.isfinite(rate).all()):
+        measured = np.concatenate((pose, rate))
+        if not np.isfinite(measured).all():
             raise InputError("eta and eta_dot must be finite, but contain NaN or infinity")
-        self.zeta = require_state(self._error(pose, rate))
+        require_pitch(pose[4])
+        self.zeta = self._error(measured)
         (self._J,) = self.setup.model.kinematics(self.zeta[:6])
         self.last_step = None
         since = self.period if self._since is None else self._since + dt
@@ -154,16 +159,13 @@ class Controller:
         """Return τ = J(η)'u of an earth-frame force u at the last state, shape (6,)."""
         return np.asarray(self._J.T @ u)
 
-    def _error(self, eta: Array, eta_dot: Array) -> Array:
+    def _error(self, measured: Array) -> Array:
         """Return the state relative to the station, in a frame turned by the station's heading.
 
         The dynamics don't depend on where north is, so the learned policy holds at every heading.
         """
-        zeta = np.concatenate([eta, eta_dot])
-        zeta[:3] = self._turn @ (eta[:3] - self.station[:3])
-        zeta[6:9] = self._turn @ eta_dot[:3]
-        turned = float(eta[5] - self.station[3])
-        zeta[5] = math.atan2(math.sin(turned), math.cos(turned))
+        zeta: Array = self._turn @ (measured - self._origin)
+        zeta[5] = math.atan2(math.sin(zeta[5]), math.cos(zeta[5]))
         return zeta
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -85,9 +86,9 @@ class HeldPlant:
         RunError
             If the integration fails or becomes too stiff, or anything is not finite.
         """
-        if not (np.isfinite(tau_b).all() and np.isfinite(tau_d).all()):
+        if not math.isfinite(tau_b @ tau_b + tau_d @ tau_d):
             raise RunError(f"the wrench is not finite at t = {t:.2f} s")
-        y = np.append(state.zeta, [state.cost, state.attenuated])
+        y = np.concatenate((state.zeta, (state.cost, state.attenuated)))
         edges = [t, *(b for b in self.source.breaks if t < b < t + dt), t + dt]
         for start, end in pairwise(edges):
             stepped = self._one_step(start, end, y, tau_b, tau_d) if self.source.steady else None
@@ -99,11 +100,9 @@ class HeldPlant:
         here = self.source.at(start, y[:3])
         water = here.water_velocity + self._current
         held = (tau_b, tau_d, here.force, water, here.water_acceleration)
-        reached, error_5, error_3 = self._step(y, end - start, *held)
-        scale = self._absolute + self.tolerance * np.maximum(np.abs(y), np.abs(reached))
+        reached, error = self._step(y, end - start, self._absolute, self.tolerance, *held)
         # written so that what is not finite is not accepted
-        accepted = dormand_prince_error(end - start, error_5, error_3, scale) < 1.0
-        return reached if accepted else None
+        return reached if error < 1.0 else None
 
     def _integrated(self, start: float, end: float, y: Array, tau_b: Array, tau_d: Array) -> Array:
         reached = integrate(
@@ -135,20 +134,21 @@ def _kernels(station: StationKeeping, vehicle: str | None) -> tuple[Kernel, Kern
 
 
 def _held_step(rates: casadi.Function) -> casadi.Function:
-    """Return one step of DOP853 of the rates, everything but the state held."""
-    y, h = MX.sym("y", 14), MX.sym("h")
+    """Return one step of DOP853 of the rates and its error, everything but the state held."""
+    y, h, absolute, relative = MX.sym("y", 14), MX.sym("h"), MX.sym("absolute", 14), MX.sym("relative")
     held = {name: MX.sym(name, *rates.size_in(name)) for name in rates.name_in()[1:]}
 
     def rate(point: MX) -> MX:
         return rates(point[:12], *held.values())[0]
 
     reached, error_5, error_3 = dormand_prince_step(rate, y, h)
+    scale = absolute + relative * casadi.fmax(casadi.fabs(y), casadi.fabs(reached))
     return casadi.Function(
         "held_step",
-        [y, h, *held.values()],
-        [reached, error_5, error_3],
-        ["y", "h", *held],
-        ["reached", "error_5", "error_3"],
+        [y, h, absolute, relative, *held.values()],
+        [reached, dormand_prince_error(h, error_5, error_3, scale)],
+        ["y", "h", "absolute", "relative", *held],
+        ["reached", "error"],
     )
 
 

@@ -4,7 +4,7 @@ from .basis import Basis, drag, drag_cubic, find_function, quadratic
 from .errors import GammaTooSmallError, InputError, RunError, StationkeepError
 from .game import Game
 from .kernel import Export, Kernel
-from .model import Model, require_state
+from .model import Model, require_pitch, require_state
 from .prediction import Path, Prediction, growing_steps
 from .problem import InverseDynamics, Problem, closed_form_problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star
@@ -40,5 +40,6 @@ __all__ = [
     "gamma_star",
     "growing_steps",
     "quadratic",
+    "require_pitch",
     "require_state",
 ]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Literal, TypeVar
 
+import casadi
 import numpy as np
 from casadi import MX, SX
 from scipy.integrate import DOP853, solve_ivp
@@ -48,16 +48,14 @@ def _combined(coefficients: Array, slopes: list[MX]) -> MX:
     return total
 
 
-def dormand_prince_error(h: float, error_5: Array, error_3: Array, scale: Array) -> float:
-    """Return the error of a step of DOP853 relative to `scale`; the step is accepted below 1.
+def dormand_prince_error(h: MX, error_5: MX, error_3: MX, scale: MX) -> MX:
+    """Return the error of a step of DOP853 relative to `scale` (n,); the step is accepted below 1.
 
-    |h| e_5^2 / sqrt(n (e_5^2 + e_3^2 / 100)) with the norms of both scaled estimates.
+    |h| e_5^2 / sqrt(n (e_5^2 + e_3^2 / 100)) with the norms of both scaled estimates; 0 where both are.
     """
-    scaled_5, scaled_3 = error_5 / scale, error_3 / scale
-    fifth, third = float(scaled_5 @ scaled_5), float(scaled_3 @ scaled_3)
-    if fifth == 0.0 and third == 0.0:
-        return 0.0
-    return h * fifth / math.sqrt((fifth + 0.01 * third) * len(scale))
+    fifth, third = casadi.sumsqr(error_5 / scale), casadi.sumsqr(error_3 / scale)
+    size = casadi.fmax(fifth + 0.01 * third, np.finfo(float).tiny)
+    return h * fifth / casadi.sqrt(size * scale.numel())
 
 
 def integrate(

@@ -49,7 +49,7 @@ class Kernel:
         for array, value in zip(self.inputs, arguments, strict=True):
             array[...] = value
         self.evaluate()
-        return tuple(output.copy(order="K") for output in self.outputs)
+        return tuple([output.copy("K") for output in self.outputs])
 
 
 def _array(size: tuple[int, int]) -> Array:

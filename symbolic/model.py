@@ -192,11 +192,17 @@ def require_state(zeta: ArrayLike, n_states: int = 12) -> Array:
     if state.shape != (n_states,):
         order = " (x,y,z,phi,theta,psi and their rates)" if n_states == 12 else ""
         raise InputError(f"a state must be {n_states} numbers{order}, but its shape is {state.shape}")
-    if not np.all(np.isfinite(state)):
+    if not np.isfinite(state).all():
         raise InputError("a state must be finite, but it contains NaN or infinity")
-    if n_states == 12 and abs(state[4]) >= PITCH_LIMIT:
+    if n_states == 12:
+        require_pitch(float(state[4]))
+    return state
+
+
+def require_pitch(theta: float) -> None:
+    """Raise InputError unless the pitch [rad] is inside ±90 degrees."""
+    if abs(theta) >= PITCH_LIMIT:
         raise InputError(
-            f"the pitch is {np.degrees(state[4]):.1f} deg, but must stay inside ±90 deg, where the "
+            f"the pitch is {np.degrees(theta):.1f} deg, but must stay inside ±90 deg, where the "
             "Euler angles are singular (Assumption 1); start closer to level"
         )
-    return state
