@@ -80,8 +80,8 @@ def print_table(options: argparse.Namespace) -> None:
     """Print one row a policy and scale."""
     print(
         f"regret above V* in %, {options.states} states a scale, {options.duration:g} s each;  "
-        "required and moonshot: median / maximum\n"
-        f"{'s':>5} {'policy':<9}{'median':>8}{'90 %':>8}{'max':>8}{'failed':>8}"
+        "required and moonshot: median / maximum; worse: states from which it costs more than linear\n"
+        f"{'s':>5} {'policy':<9}{'median':>8}{'90 %':>8}{'max':>8}{'failed':>8}{'worse':>7}"
         f"{'of linear: median':>20}{'max':>7}{'  required':<18}{'moonshot':<18}{'real time x':>11}"
     )
     for scale in options.scales:
@@ -104,22 +104,24 @@ def print_table(options: argparse.Namespace) -> None:
         # a linear policy that lost the vehicle somewhere excuses nobody
         linear = Summary.of(row.regret for row in found["linear"] if np.isfinite(row.regret))
         for name, rows in found.items():
-            print_row(scale, name, rows, linear)
+            pairs = zip(rows, found["linear"], strict=True)
+            worse = sum(row.regret > other.regret for row, other in pairs)
+            print_row(scale, name, rows, linear, worse)
 
 
-def print_row(scale: float, name: str, rows: list[Row], linear: Summary) -> None:
+def print_row(scale: float, name: str, rows: list[Row], linear: Summary, worse: int) -> None:
     """Print the figures of a policy at a scale, and the reasons of its failures on stderr."""
     one = Summary.of(row.regret for row in rows)
     figures = "".join(f"{100 * value:8.3f}" for value in (one.median, one.p90, one.largest))
     line = f"{scale:5.2f} {name:<9}{figures}{one.failed:>8}"
     if name != "linear":
-        line += f"{one.median / linear.median:20.3f}{one.largest / linear.largest:7.3f}  "
+        line += f"{worse:>7}{one.median / linear.median:20.3f}{one.largest / linear.largest:7.3f}  "
         for limits in (target(REQUIRED, scale), target(MOONSHOT, scale)):
             line += f"{' / '.join('met' if m else 'missed' for m in limits.met(one, linear)):<18}"
     else:
-        line += " " * 65
+        line += " " * 72
     speed = [row.simulated / row.seconds for row in rows if row.seconds > 0.0]
-    print(f"{line.ljust(98)}{np.median(speed):9.0f}", flush=True)
+    print(f"{line.ljust(105)}{np.median(speed):9.0f}", flush=True)
     for reason in {row.stopped for row in rows if row.stopped}:
         print(f"  {name}: {reason}", file=sys.stderr)
 

@@ -150,18 +150,23 @@ def closed_loops(duration: float = 30.0) -> None:
     fixed = [*FIXED, "basis.name=quadratic", "samples.number=300", "simulation.control_period=0.01"]
     runs = {
         "gradient 100 Hz, 78 functions": [*fixed, "learner.rule=gradient", "learner.period=0.01"],
-        "least squares 20 Hz, 78": [*fixed, "learner.period=0.05"],
+        "least squares 20 Hz, control 100 Hz, 78": [*fixed, "learner.period=0.05"],
+        "least squares 20 Hz, control 50 Hz, 78": [
+            *fixed,
+            "learner.period=0.05",
+            "simulation.control_period=0.02",
+        ],
         "shipped: predictions 4 Hz, 144": [],
     }
     print(
-        f"\n{'closed loop':<34}{'x real time, processor':>24}{'wall clock':>12}{'policy mean [us]':>18}"
+        f"\n{'closed loop':<42}{'x real time, processor':>24}{'wall clock':>12}{'policy mean [us]':>18}"
     )
     for name, overrides in runs.items():
         scenario = Scenario.load(overrides=[*overrides, f"simulation.duration={duration}"])
         policy = Controller(scenario)
         history = run(scenario, policy)
         print(
-            f"{name:<34}{history.time[-1] / history.processor_seconds:>24.0f}"
+            f"{name:<42}{history.time[-1] / history.processor_seconds:>24.0f}"
             f"{history.time[-1] / history.wall_seconds:>12.0f}{1e6 * history.policy_mean:>18.1f}"
             f"  {history.stopped or ''}",
             flush=True,

@@ -78,8 +78,7 @@ class LinearPolicy(Baseline):
         return -self.gain @ zeta
 
     def _gain(self) -> Array:
-        _, B = self.station.problem.linearization
-        return np.asarray(self.station.game.R_inverse @ B.T @ self.station.problem.P)
+        return self.station.problem.linear_gains[0]
 
 
 class LQR(LinearPolicy):
@@ -88,5 +87,4 @@ class LQR(LinearPolicy):
     def _gain(self) -> Array:
         game = self.station.game
         alone = self.station.problem.with_game(Game(game.Q, game.R, game.W_d, np.inf))
-        _, B = alone.linearization
-        return np.asarray(game.R_inverse @ B.T @ alone.P)
+        return alone.linear_gains[0]

@@ -24,7 +24,7 @@ from .contenders import contender
 from .files import with_files
 from .scenario import Scenario
 
-FORMAT = 6  # of the records; raise it when what is in them, or how a run is made, changes
+FORMAT = 7  # of the records; raise it when what is in them, or how a run is made, changes
 OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
 
 

@@ -4,7 +4,8 @@ from .allocation import Allocation, Allocator
 from .closed_loop import History, Policy, run
 from .controller import Controller
 from .disturbance import build_disturbance
-from .learner import Learner, LearnerStep
+from .learner import Learner
+from .learner_step import LearnerStep
 from .monitor import Look, Monitor
 from .observer import DisturbanceObserver
 from .record import load, load_weights, save, to_dataset

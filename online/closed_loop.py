@@ -15,7 +15,7 @@ from ..symbolic.vehicle import Array
 from .allocation import Allocator
 from .controller import Controller, ControllerScenario, fixed_points
 from .disturbance import DisturbanceSource, build_disturbance
-from .learner import LearnerStep
+from .learner_step import LearnerStep
 from .monitor import Look, Monitor
 from .noise import MeasurementNoise
 from .observer import DisturbanceObserver
@@ -73,6 +73,7 @@ class History:
     predicted_cost: list[float] = field(default_factory=list)
     accepted: list[float] = field(default_factory=list)
     fallback: list[bool] = field(default_factory=list)
+    linear: list[bool] = field(default_factory=list)
     critic: list[Array] = field(default_factory=list)
     actor_1: list[Array] = field(default_factory=list)
     actor_2: list[Array] = field(default_factory=list)
@@ -220,6 +221,7 @@ class _Loop:
         history.predicted_cost.append(seen.predicted_cost)
         history.accepted.append(seen.accepted)
         history.fallback.append(seen.fallback)
+        history.linear.append(seen.linear)
         history.critic.append(seen.critic)
         history.actor_1.append(seen.actor_1)
         history.actor_2.append(seen.actor_2)

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from ..symbolic import InputError, StationKeeping, require_pitch
 from ..symbolic.vehicle import Array
-from .learner import Learner, LearnerStep
+from .learner import Learner
+from .learner_step import LearnerStep
 from .samples import (
     FixedSamples,
     SampleStrategy,
@@ -50,9 +51,9 @@ class Controller:
     ----------
     scenario : vehicle, game, basis, learner and samples
     station : x, y, z [m] and heading ψ [rad] to hold, in the earth frame
-    learn : False keeps the initial weights (with the default ones, the linear H-infinity policy
-        -R^-1 g(ζ)'P ζ); with a safeguard, only from where they are predicted to cost less than the
-        reference weights
+    learn : False keeps the initial weights (with the default ones, the policy -R^-1 g(ζ)'P ζ); with a
+        safeguard, only from where they are predicted to cost less than the reference weights and the
+        linear H-infinity policy
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
-"""The actor-critic: critic (19) or least squares, actors (20)(21), and what is watched of them."""
+"""The actor-critic: critic (19) or least squares, and actors (20)(21)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ..symbolic.vehicle import Array
 from .actor import Projection, actor_step
 from .bellman import BellmanTerms, Residual, bellman_error
 from .critic import Equations, LeastSquares, NormalEquations, gradient_step, row_weights
+from .learner_step import LearnerStep
 from .memory import Memory
 from .rows import BellmanSource, CostateSource, PathRows, RelativeTo, RowSource, SampleRows, Weights
 from .safeguard import Safeguard
@@ -18,37 +19,6 @@ from .samples import FixedSamples, SampleStrategy
 from .settings import LearnerSettings, SampleSettings
 from .vector_code import library
 from .vector_rows import RowGains, VectorRows
-
-
-@dataclass(frozen=True)
-class LearnerStep:
-    """What the learner saw at a state, and the weights under which it saw it.
-
-    Attributes
-    ----------
-    critic, actor_1, actor_2 : (m,) weights, before a step moves them
-    bellman_error : δ at the state (17), in units of cost per second
-    sample_error : rms over the samples of δ_j / (ζ_j'Qζ_j), or the root of the relative regret along
-        the predicted paths; NaN without samples
-    projecting : whether the smooth projection acts on an actor
-    rows : what the critic learns from, state, samples and leash
-    information : (m, m) Γ^-1 of least squares before the step
-    predicted_cost : J of the policy in use before the actors moved; NaN without safeguard
-    accepted : part of the actors' step that was certified; 1 without safeguard
-    fallback : whether the policy in use after the step is the linear one, since no other was certified
-    """
-
-    critic: Array
-    actor_1: Array
-    actor_2: Array
-    bellman_error: float
-    sample_error: float
-    projecting: bool
-    rows: Equations
-    information: Array
-    predicted_cost: float = np.nan
-    accepted: float = 1.0
-    fallback: bool = False
 
 
 class Learner:
@@ -61,7 +31,7 @@ class Learner:
     settings : rule and gains
     samples : (N, n) fixed points ζ_j, N may be 0; or a strategy that moves them
     reference : (m,) weights that the leash pulls to, the projection bound is a multiple of, and the
-        safeguard falls back to
+        safeguard falls back to; beside the linear H-infinity policy where the settings say `riccati`
     initial : (m,) weights of critic and actors at the start; `reference` times weight_factor if None
     functions : compiled functions of problem and basis, if they exist already
     paths : settings of the predicted paths of `costate` rows
@@ -70,6 +40,7 @@ class Learner:
     Attributes
     ----------
     critic, actor_1, actor_2 : (m,) Ŵ_c, Ŵ_a1, Ŵ_a2
+    linear : whether the linear H-infinity policy is in use instead of the actors'
     memory : weights for the whole envelope, or None
     """
 
@@ -93,6 +64,7 @@ class Learner:
         start = reference * settings.weight_factor if initial is None else initial
         self.critic, self.actor_1, self.actor_2 = start.copy(), start.copy(), start.copy()
         self._initial = (self.actor_1, self.actor_2)
+        self.linear = False
         self.projection = self._ball()
         self._least_squares = LeastSquares(
             basis.n_basis,
@@ -106,7 +78,7 @@ class Learner:
         self._source = self._row_source(samples, paths or SampleSettings())
         self._fixed_leash = self._leash(reference) if settings.error == "bellman" else None
         self.memory = self._new_memory(envelope, paths or SampleSettings())
-        self._guard = Safeguard(self.predicted_cost, reference) if settings.safeguard else None
+        self._guard = self._safeguard() if settings.safeguard else None
 
     @property
     def game(self) -> Game:
@@ -131,9 +103,9 @@ class Learner:
             actor_step(actors[1], self.critic, gains[1], dt, self.projection),
         )
         if self._guard is not None:
-            proposed, accepted = self._guard.accepted(zeta, actors, proposed, cost)
-            fallback = restarted and accepted == 0.0
-            seen = replace(seen, predicted_cost=cost, accepted=accepted, fallback=fallback)
+            proposed, accepted, reached = self._guard.accepted(zeta, actors, proposed, cost)
+            self.linear = self._guard.linear_cost(zeta) < reached
+            seen = self._judged(seen, cost, accepted, restarted and accepted == 0.0)
         self.actor_1, self.actor_2 = proposed
         if self.memory is not None:
             self.memory.step()
@@ -145,8 +117,19 @@ class Learner:
         For a learner that is not to learn; it needs the safeguard.
         """
         assert self._guard is not None
-        (self.actor_1, self.actor_2), cost, fell_back = self._guard.certified(zeta, self._initial)
-        return replace(self.observe(zeta), predicted_cost=cost, accepted=0.0, fallback=fell_back)
+        (self.actor_1, self.actor_2), cost, restarted = self._guard.certified(zeta, self._initial)
+        self.linear = self._guard.linear_cost(zeta) < cost
+        return self._judged(self.observe(zeta), cost, 0.0, restarted)
+
+    def _judged(self, seen: LearnerStep, cost: float, accepted: float, restarted: bool) -> LearnerStep:
+        """Return the step with what the safeguard did."""
+        return replace(
+            seen,
+            predicted_cost=cost,
+            accepted=accepted,
+            fallback=restarted or self.linear,
+            linear=self.linear,
+        )
 
     def observe(self, zeta: Array) -> LearnerStep:
         """Return what a step at ζ (n,) would see at the present samples, without moving anything."""
@@ -163,7 +146,10 @@ class Learner:
         )
 
     def policies(self, zeta: Array) -> tuple[Array, Array]:
-        """Return û_1 (14) and û_2 (15) at ζ, each (k,)."""
+        """Return û_1 (14) and û_2 (15) at ζ, each (k,); the linear policies' where they are in use."""
+        if self.linear:
+            K_1, K_2 = self.problem.linear_gains
+            return -K_1 @ zeta, K_2 @ zeta
         u_control, u_disturbance = self.functions.policies(zeta, self.actor_1, self.actor_2)
         return u_control, u_disturbance
 
@@ -245,6 +231,16 @@ class Learner:
     def _predict(self, zeta: Array, actor_1: Array, actor_2: Array) -> Path:
         prediction = self.functions.prediction(self.settings.steps)
         return prediction.path(zeta, actor_1, actor_2, self._steps)
+
+    def _safeguard(self) -> Safeguard:
+        prediction = self.functions.prediction(self.settings.steps)
+
+        def linear_cost(zeta: Array) -> float:
+            return prediction.linear_path(zeta, self._steps).cost
+
+        if self.settings.reference != "riccati":  # nothing is known but the start
+            return Safeguard(self.predicted_cost, self.reference)
+        return Safeguard(self.predicted_cost, self.reference, linear_cost)
 
     def _row_source(self, samples: Array | SampleStrategy, paths: SampleSettings) -> RowSource:
         if self.settings.error == "costate":

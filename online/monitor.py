@@ -15,7 +15,8 @@ import numpy as np
 from ..symbolic.vehicle import Array
 from .bellman import BellmanTerms, Residual, bellman_error
 from .critic import Equations
-from .learner import Learner, LearnerStep
+from .learner import Learner
+from .learner_step import LearnerStep
 from .samples import regressor_spectrum
 
 BLOCK = 100  # points that are evaluated together

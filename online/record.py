@@ -26,7 +26,7 @@ FORCE_NAMES = ("X", "Y", "Z", "K", "M", "N")
 OVER_TIME = ("time", "zeta", "tau_b", "u_control", "disturbance", "cost", "attenuated")
 OVER_LEARNING = (
     *("learn_time", "bellman_error", "sample_error", "projecting"),
-    *("predicted_cost", "accepted", "fallback"),
+    *("predicted_cost", "accepted", "fallback", "linear"),
     *("critic", "actor_1", "actor_2"),
 )
 _STATE_UNITS = "m, rad, m/s, rad/s"
@@ -99,6 +99,7 @@ def _variables(
         "predicted_cost": (over_learning, series("predicted_cost"), "cost"),
         "accepted": (over_learning, series("accepted"), "1"),
         "fallback": (over_learning, series("fallback").astype(np.int8), "1"),
+        "linear": (over_learning, series("linear").astype(np.int8), "1"),
         "critic": (weights, stack("critic", m), "cost"),
         "actor_1": (weights, stack("actor_1", m), "cost"),
         "actor_2": (weights, stack("actor_2", m), "cost"),

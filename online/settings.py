@@ -31,8 +31,9 @@ class LearnerSettings(Settings):
     rule : `gradient` is (19); `least_squares` is recursive, with forgetting
     error : what the critic learns from: `bellman`, the Bellman error (17) at the samples, or `costate`,
         the error of its gradient's policy along predicted trajectories, see `rows.CostateSource`
-    safeguard : move the actors only as far as the model predicts no higher cost, and restart them from
-        the reference weights where these are predicted to cost less
+    safeguard : move the actors only as far as the model predicts no higher cost, restart them from the
+        reference weights where these are predicted to cost less, and use the linear H-infinity policy
+        where that is
     horizon : of the predictions [s]; after it the cost is ζ'P ζ
     steps : of the integration over the horizon
     normalizer : weight of a row; `paper` is 1/p as printed, see `critic.row_weights`
@@ -50,7 +51,8 @@ class LearnerSettings(Settings):
         scenario's own vehicle when not given
     weight_factor : multiple of those weights to start from
     reference : the weights that leash, projection and safeguard hold to: `riccati`, those of the
-        scenario's own vehicle, or `initial`, whatever the learner starts from
+        scenario's own vehicle, or `initial`, whatever the learner starts from (and then the safeguard
+        knows of no linear H-infinity policy)
     weight_bound : projection bound as a multiple of the norm of the reference weights
     """
 

@@ -88,6 +88,11 @@ class Prediction:
         (nodes,) = self._path_kernel(zeta, actor_1, actor_2, steps)
         return self._as_path(nodes, steps)
 
+    def linear_path(self, zeta: Array, steps: Array) -> Path:
+        """Return the path from ζ (n,) under the linear policies u_1 = -K_1 ζ and u_2 = K_2 ζ."""
+        (nodes,) = self._linear_kernel(zeta, steps)
+        return self._as_path(nodes, steps)
+
     def costates(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> Path:
         """Return the same path with its costates."""
         nodes, costates = self._costate_kernel(zeta, actor_1, actor_2, steps)
@@ -120,48 +125,69 @@ class Prediction:
 
     @cached_property
     def _step(self) -> casadi.Function:
-        """One Runge-Kutta step of (ζ, cost, clock); outside the bound nothing moves any more."""
-        n, m = self.problem.n_states, self.basis.n_basis
+        """One Runge-Kutta step of (ζ, cost, clock) under the policies of given weights."""
+        return self._step_of(self._rates)
+
+    def _step_of(self, rates: casadi.Function) -> casadi.Function:
+        """Return a step of rates with parameters; outside the bound nothing moves any more."""
+        n = self.problem.n_states
         y, dt = MX.sym("y", n + 2), MX.sym("dt")
-        weights = MX.sym("actor_1", m), MX.sym("actor_2", m)
-        moved = runge_kutta_step(lambda at: self._rates(at, *weights), y, dt)
+        parameters = [MX.sym(rates.name_in(i), *rates.size_in(i)) for i in range(1, rates.n_in())]
+        moved = runge_kutta_step(lambda at: rates(at, *parameters), y, dt)
         inside = casadi.mmax(casadi.fabs(moved[:n] / DM(self.problem.scale))) < BOUND
-        return casadi.Function("step", [y, *weights, dt], [casadi.if_else(inside, moved, y)])
+        return casadi.Function("step", [y, *parameters, dt], [casadi.if_else(inside, moved, y)])
 
     @cached_property
     def _rates(self) -> casadi.Function:
-        """Rates of (ζ, cost, clock) under both policies."""
-        problem, game = self.problem, self.problem.game
-        n, m = problem.n_states, self.basis.n_basis
-        y, actor_1, actor_2 = SX.sym("y", n + 2), SX.sym("actor_1", m), SX.sym("actor_2", m)
-        g = problem.input_matrix
+        """Rates of (ζ, cost, clock) under the policies (14)(15)."""
+        game, m = self.problem.game, self.basis.n_basis
+        actors = [SX.sym("actor_1", m), SX.sym("actor_2", m)]
         push_1, push_2 = (
-            g.T @ casadi.gradient(casadi.dot(weights, self.basis.sigma), problem.zeta)
-            for weights in (actor_1, actor_2)
+            self.problem.input_matrix.T
+            @ casadi.gradient(casadi.dot(weights, self.basis.sigma), self.problem.zeta)
+            for weights in actors
         )
         u_1, u_2 = -0.5 * DM(game.R_inverse) @ push_1, 0.5 * DM(game.disturbance_inverse) @ push_2
+        return self._rates_under(u_1, u_2, actors)
+
+    def _rates_under(self, u_1: SX, u_2: SX, parameters: list[SX]) -> casadi.Function:
+        problem, game = self.problem, self.problem.game
+        y = SX.sym("y", problem.n_states + 2)
         cost = casadi.dot(problem.zeta, DM(game.Q) @ problem.zeta) + casadi.dot(u_1, DM(game.R) @ u_1)
         if np.isfinite(game.gamma):
             cost -= game.gamma**2 * casadi.dot(u_2, DM(game.W_d) @ u_2)
-        rates = casadi.vertcat(problem.drift + g @ (u_1 + u_2), cost, 1)
-        at_y = casadi.substitute(rates, problem.zeta, y[:n])
-        return casadi.Function("rates", [y, actor_1, actor_2], [at_y], {"cse": True})
+        rates = casadi.vertcat(problem.drift + problem.input_matrix @ (u_1 + u_2), cost, 1)
+        at_y = casadi.substitute(rates, problem.zeta, y[: problem.n_states])
+        names = ["y", *(f"parameter_{i}" for i in range(len(parameters)))]
+        return casadi.Function("rates", [y, *parameters], [at_y], names, ["rates"], {"cse": True})
 
     def _symbols(self) -> tuple[MX, list[MX]]:
         n, m = self.problem.n_states, self.basis.n_basis
         inputs = [MX.sym("zeta", n), MX.sym("actor_1", m), MX.sym("actor_2", m)]
         steps = MX.sym("steps", self.n_steps)
+        return self._nodes(self._step, inputs, steps), [*inputs, steps]
+
+    def _nodes(self, step: casadi.Function, inputs: list[MX], steps: MX) -> MX:
         start = casadi.vertcat(inputs[0], MX.zeros(2))
-        repeated = [casadi.repmat(weights, 1, self.n_steps) for weights in inputs[1:]]
-        later = self._step.mapaccum(self.n_steps)(start, *repeated, steps.T)
-        return casadi.horzcat(start, later), [*inputs, steps]
+        repeated = [casadi.repmat(parameter, 1, self.n_steps) for parameter in inputs[1:]]
+        return casadi.horzcat(start, step.mapaccum(self.n_steps)(start, *repeated, steps.T))
 
     @cached_property
     def _path_kernel(self) -> Kernel:
         nodes, inputs = self._symbols()
         names = [symbol.name() for symbol in inputs]
         function = casadi.Function("predicted_path", inputs, [nodes], names, ["nodes"])
-        return self._exporter(function, self._operations())
+        return self._exporter(function, self._operations(self._rates))
+
+    @cached_property
+    def _linear_kernel(self) -> Kernel:
+        zeta, steps = MX.sym("zeta", self.problem.n_states), MX.sym("steps", self.n_steps)
+        K_1, K_2 = self.problem.linear_gains
+        rates = self._rates_under(-DM(K_1) @ self.problem.zeta, DM(K_2) @ self.problem.zeta, [])
+        nodes = self._nodes(self._step_of(rates), [zeta], steps)
+        names = ["zeta", "steps"]
+        function = casadi.Function("predicted_linear_path", [zeta, steps], [nodes], names, ["nodes"])
+        return self._exporter(function, self._operations(rates))
 
     @cached_property
     def _costate_kernel(self) -> Kernel:
@@ -179,10 +205,10 @@ class Prediction:
         names = [symbol.name() for symbol in inputs]
         outputs = ["nodes", "costates"]
         function = casadi.Function("predicted_costates", inputs, [nodes, costates], names, outputs)
-        return self._exporter(function, 4 * self._operations())
+        return self._exporter(function, 4 * self._operations(self._rates))
 
-    def _operations(self) -> int:
-        return int(4 * self.n_steps * self._rates.n_instructions())
+    def _operations(self, rates: casadi.Function) -> int:
+        return int(4 * self.n_steps * rates.n_instructions())
 
     def _rows_of(self, n_points: int) -> Kernel:
         problem, n = self.problem, self.problem.n_states

@@ -108,6 +108,16 @@ class Problem:
         return riccati.gamma_derivative(*self.linearization, self.game, self.P)
 
     @cached_property
+    def linear_gains(self) -> tuple[Array, Array]:
+        """K_1 = R^-1 B'P and K_2 = γ^-2 W_d^-1 B'P, each (k, n).
+
+        u_1 = -K_1 ζ and u_2 = K_2 ζ are the linear H-infinity policies.
+        """
+        _, B = self.linearization
+        push = B.T @ self.P
+        return self.game.R_inverse @ push, self.game.disturbance_inverse @ push
+
+    @cached_property
     def linear_gain(self) -> Array:
         """-R_eff^-1 B'P, (k, n): v of the linear H-infinity policy is this times ζ."""
         _, B = self.linearization

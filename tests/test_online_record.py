@@ -282,7 +282,7 @@ def test_a_run_goes_on_from_a_record(dataset: xr.Dataset, tmp_path: Path) -> Non
 def test_weights_of_another_basis_are_refused(tmp_path: Path, one_sentence: Check) -> None:
     other = History(learn_time=[0.0], critic=[np.ones(5)], actor_1=[np.ones(5)], actor_2=[np.ones(5)])
     other.bellman_error, other.sample_error = [0.0], [0.0]
-    other.projecting, other.fallback = [False], [False]
+    other.projecting, other.fallback, other.linear = [False], [False], [False]
     other.predicted_cost, other.accepted = [1.0], [1.0]
     path = save(to_dataset(other, {}), tmp_path / "other.nc")
     scenario = Scenario.load("bluerov2-heavy", [*QUICK, f'learner.weights="{path}"'])

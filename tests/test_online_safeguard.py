@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 from stationkeep.online import Learner, LearnerSettings, SampleSettings
 from stationkeep.online.safeguard import Safeguard
 from stationkeep.online.samples import (
@@ -82,8 +83,10 @@ def pair(value: float) -> tuple[Array, Array]:
 def test_actors_go_as_far_as_is_certified(present: float, proposed: float, accepted: float) -> None:
     guard = Safeguard(cost_of, np.zeros(2))
     start = pair(present)
-    moved, part = guard.accepted(np.zeros(2), start, pair(proposed), cost_of(np.zeros(2), *start))
+    before = cost_of(np.zeros(2), *start)
+    moved, part, cost = guard.accepted(np.zeros(2), start, pair(proposed), before)
     assert part == accepted
+    assert cost == cost_of(np.zeros(2), *moved) < before
     np.testing.assert_allclose(moved[0], present + part * (proposed - present))
 
 
@@ -91,8 +94,8 @@ def test_actors_go_as_far_as_is_certified(present: float, proposed: float, accep
 def test_actors_stay_when_nothing_is_certified(proposed: float) -> None:
     guard = Safeguard(cost_of, np.zeros(2))
     start = pair(0.0)
-    moved, part = guard.accepted(np.zeros(2), start, pair(proposed), 4.0)
-    assert part == 0.0
+    moved, part, cost = guard.accepted(np.zeros(2), start, pair(proposed), 4.0)
+    assert (part, cost) == (0.0, 4.0)
     assert moved is start
 
 
@@ -114,6 +117,31 @@ def test_a_learner_that_starts_worse_than_linear_falls_back() -> None:
     seen = taught.step(np.array([0.5, 0.5]), 1e-9)
     assert seen.fallback
     np.testing.assert_allclose(taught.actor_1, TWO_STATE_WEIGHTS)
+
+
+def test_the_linear_policy_is_used_where_no_weights_are_certified() -> None:
+    """Actors and reference lose the vehicle; K_1 and K_2 come from scipy's Riccati equation."""
+    problem = two_state()[0]
+    wild, zeta = np.array([0.0, 0.0, -9.0]), np.array([0.5, 0.5])
+    taught = learner(COSTATE.model_copy(update={"error": "bellman"}), wild)
+    assert not np.isfinite(taught.predicted_cost(zeta, wild, wild))
+    seen = taught.step(zeta, 1e-9)
+    assert seen.fallback
+    assert seen.linear
+    A, B = problem.linearization
+    P = scipy.linalg.solve_continuous_are(A, B, problem.game.Q, problem.game.R_eff)
+    u_1, u_2 = taught.policies(zeta)
+    np.testing.assert_allclose(u_1, -B.T @ P @ zeta, rtol=1e-8)  # R = 1
+    np.testing.assert_allclose(u_2, B.T @ P @ zeta / 4.0, rtol=1e-8)  # γ = 2, W_d = 1
+
+
+def test_the_linear_policy_gives_way_to_learned_weights() -> None:
+    """Near the end of learning the weights are exact, and no other policy costs less."""
+    taught = learner(COSTATE, 3.0 * TWO_STATE_WEIGHTS)
+    zeta = np.array([1.5, -1.5])
+    linear = [taught.step(zeta, dt).linear for dt in (1e-3, *[0.25] * 20)]
+    assert linear[0]
+    assert not linear[-1]
 
 
 def straight(length: float = 10.0) -> Path:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import solve_continuous_are
 from stationkeep.symbolic import Prediction, ValueFunctions, growing_steps
 
-from .games import TWO_STATE_WEIGHTS, linear_quadratic, two_state
+from .games import TWO_STATE_WEIGHTS, Array, linear_quadratic, two_state
+
+Policies = Callable[[Array], Sequence[Array]]
 
 START = np.array([1.0, -1.5])
 STEPS = growing_steps(20.0, 400)
@@ -40,23 +45,47 @@ def test_optimal_policies_cost_the_value_and_the_costate_is_its_gradient() -> No
 def test_path_agrees_with_another_integration(actors: tuple[tuple[float, ...], ...]) -> None:
     problem, _, functions = two_state()
     actor_1, actor_2 = (np.array(actor) for actor in actors)
-    game = problem.game
-    terms = functions.at(START[None, :])
-    assert terms.f.shape == (1, 2)
+    assert functions.at(START[None, :]).f.shape == (1, 2)
+    path = prediction(functions).path(START, actor_1, actor_2, STEPS)
+    states, cost = integrated(lambda zeta: functions.policies(zeta, actor_1, actor_2), path.times)
+    np.testing.assert_allclose(path.states, states, atol=1e-5)
+    rest = states[-1] @ problem.P @ states[-1]
+    assert path.cost == pytest.approx(cost + rest, rel=1e-6)
 
-    def rates(t: float, y: np.ndarray) -> np.ndarray:
+
+def integrated(policies: Policies, times: Array) -> tuple[Array, Array]:
+    """Return scipy's states at the times and the cost at the last, under policies from START."""
+    problem, _, functions = two_state()
+
+    def rates(t: float, y: Array) -> Array:
         here = functions.at(y[None, :2])
-        u_1, u_2 = functions.policies(y[:2], actor_1, actor_2)
-        cost = game.local_cost(y[:2], u_1, u_2)
+        u_1, u_2 = policies(y[:2])
+        cost = problem.game.local_cost(y[:2], u_1, u_2)
         return np.append(here.f[0] + here.g[0] @ (u_1 + u_2), cost)
 
-    path = prediction(functions).path(START, actor_1, actor_2, STEPS)
-    known = solve_ivp(
-        rates, (0.0, 20.0), np.append(START, 0.0), "DOP853", path.times, rtol=1e-10, atol=1e-12
-    )
-    np.testing.assert_allclose(path.states, known.y[:2].T, atol=1e-5)
-    rest = known.y[:2, -1] @ problem.P @ known.y[:2, -1]
-    assert path.cost == pytest.approx(known.y[2, -1] + rest, rel=1e-6)
+    start = np.append(START, 0.0)
+    known = solve_ivp(rates, (0.0, times[-1]), start, "DOP853", times, rtol=1e-10, atol=1e-12)
+    return known.y[:2].T, known.y[2, -1]
+
+
+def test_linear_path_agrees_with_another_integration() -> None:
+    """With gains from scipy's Riccati solution; R = 1, γ = 2, W_d = 1."""
+    problem, _, functions = two_state()
+    A, B = problem.linearization
+    P = solve_continuous_are(A, B, problem.game.Q, problem.game.R_eff)
+    push = B.T @ P
+    path = prediction(functions).linear_path(START, STEPS)
+    states, cost = integrated(lambda zeta: (-push @ zeta, push @ zeta / 4.0), path.times)
+    np.testing.assert_allclose(path.states, states, atol=1e-5)
+    assert path.cost == pytest.approx(cost + states[-1] @ P @ states[-1], rel=1e-6)
+
+
+def test_linear_path_of_a_linear_quadratic_game_costs_its_value() -> None:
+    problem, _, functions = linear_quadratic()
+    zeta = 0.3 * problem.scale
+    steps = growing_steps(30.0, 300)
+    path = functions.prediction(len(steps)).linear_path(zeta, steps)
+    assert path.cost == pytest.approx(zeta @ problem.P @ zeta, rel=1e-6)
 
 
 def test_costate_is_the_gradient_of_the_predicted_cost() -> None:
