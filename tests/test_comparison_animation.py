@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -52,6 +55,26 @@ def test_a_gif_has_its_frames_and_its_time(tmp_path: Path, monkeypatch: pytest.M
         assert film.n_frames == 6  # 4 s, eight times as fast, ten frames a second
         assert film.info["duration"] == 1000 / FRAMES_PER_SECOND
     assert path.stat().st_size < 3_000_000
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ffprobe") is None, reason="there is no ffmpeg")
+def test_an_mp4_has_its_frames_and_its_time(tmp_path: Path) -> None:
+    """As ffprobe counts them."""
+    path = animate(tmp_path, *runs(), speed=8.0)
+    assert [file.name for file in tmp_path.iterdir()] == [path.name] == ["animation.mp4"]
+    asked = [
+        "-count_frames",
+        "-show_entries",
+        "stream=codec_name,nb_read_frames,duration",
+        "-of",
+        "json",
+    ]
+    told = subprocess.run(["ffprobe", "-v", "error", *asked, path], capture_output=True, check=True)
+    (stream,) = json.loads(told.stdout)["streams"]
+    assert stream["codec_name"] == "h264"
+    assert int(stream["nb_read_frames"]) == 6
+    assert float(stream["duration"]) == pytest.approx(6 / FRAMES_PER_SECOND)
 
 
 def test_without_a_writer(
