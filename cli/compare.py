@@ -12,7 +12,15 @@ from ..comparison.compare import Comparison, Plan, compare
 from ..comparison.figures import draw_all
 from ..comparison.pool import default_workers
 from ..comparison.report import write_report
-from ..comparison.report_tables import certificate, summary, too_short, verdict
+from ..comparison.report_tables import (
+    CLAIRVOYANT_CHECK,
+    REGRET_OF_A_RUN,
+    certificate,
+    clairvoyant_check,
+    summary,
+    too_short,
+    verdict,
+)
 from ..comparison.style import Page
 from ..symbolic import InputError
 from .output import Tell, load_scenario, output_folder, print_json, print_table, progress
@@ -52,7 +60,7 @@ def _film(options: argparse.Namespace, comparison: Comparison, folder: Path, tel
     from ..comparison.animation import animate
 
     tell("animation", 0.0)
-    return animate(folder, comparison.records["learned"], comparison.optimal)
+    return animate(folder, comparison.records["learned"], comparison.reference)
 
 
 def _answer(comparison: Comparison, figures: dict[str, Path], report: Path) -> dict[str, Any]:
@@ -67,14 +75,25 @@ def _answer(comparison: Comparison, figures: dict[str, Path], report: Path) -> d
         "report": report,
         "faults": comparison.faults,
     }
-    if comparison.margins:
-        answer["dissipation_margin"] = comparison.margins
     notes = {}
+    if comparison.disturbed:
+        answer["dissipation_margin"] = comparison.margins
+        answer["clairvoyant"] = _clairvoyant(comparison)
+        notes["regret"] = REGRET_OF_A_RUN
     if comparison.regret is None:
-        notes["regret"] = verdict(comparison)
+        notes["regret"] = notes["clairvoyant"] = verdict(comparison)
     elif comparison.too_short:
         notes["regret"] = too_short(comparison)
     return answer | {"notes": notes}
+
+
+def _clairvoyant(comparison: Comparison) -> dict[str, Any] | None:
+    """Return value, errors and effort of the clairvoyant optimum, None where there is none."""
+    if comparison.clairvoyant is None:
+        return None
+    attributes = comparison.clairvoyant.attrs
+    names = ("value", *CLAIRVOYANT_CHECK, "rounds", "intervals", "iterations", "seconds")
+    return {name: attributes[name].item() for name in names}
 
 
 def _commands(options: argparse.Namespace) -> list[str]:
@@ -90,6 +109,8 @@ def _commands(options: argparse.Namespace) -> list[str]:
 def _print(comparison: Comparison, report: Path) -> None:
     print_table("Learned beside optimal", *summary(comparison))
     print_table("Certificate of the optimum", *certificate(comparison))
+    if comparison.clairvoyant is not None:
+        print_table("Check of the clairvoyant optimum", *clairvoyant_check(comparison.clairvoyant))
     print(verdict(comparison))
     if comparison.regret is not None and comparison.too_short:
         print(too_short(comparison))

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from ..online.record import written_whole
 from ..symbolic import InputError
 from ..symbolic.vehicle import Array
+from .clairvoyant import optimum_name
 from .metrics import cost_to_date
 from .style import LEARNED, OPTIMAL
 
@@ -34,6 +35,7 @@ class Frames:
     time : (F,) [s]
     learned, optimal : (F, 12) states [m, rad, m/s, rad/s]
     learned_cost, optimal_cost : (F,) cost to date
+    optimum : what the optimum is called
     """
 
     time: Array
@@ -41,6 +43,7 @@ class Frames:
     optimal: Array
     learned_cost: Array
     optimal_cost: Array
+    optimum: str
 
 
 def frames(learned: xr.Dataset, optimal: xr.Dataset, n_frames: int) -> Frames:
@@ -60,6 +63,7 @@ def frames(learned: xr.Dataset, optimal: xr.Dataset, n_frames: int) -> Frames:
         at(optimal, optimal["zeta"].values),
         at(learned, cost_to_date(learned))[:, 0],
         at(optimal, optimal["cost"].values)[:, 0],
+        optimum_name(optimal),
     )
 
 
@@ -123,7 +127,7 @@ class _Scene:
         plan = sheet.add_subplot(grid[:, 0])
         depth, cost = sheet.add_subplot(grid[0, 1]), sheet.add_subplot(grid[1, 1])
         runs = (
-            ("optimal", OPTIMAL, shown.optimal, shown.optimal_cost),
+            (shown.optimum, OPTIMAL, shown.optimal, shown.optimal_cost),
             ("learned", LEARNED, shown.learned, shown.learned_cost),
         )
         reach = float(np.abs(np.concatenate([shown.learned, shown.optimal])[:, :2]).max())

@@ -2,35 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from ..offline import OfflineSolver
 from ..online import draw_samples, load
 from ..symbolic import RunError, StationKeeping
 from .analysis import Field, analysis_record, ideal_of
+from .clairvoyant import KIND as CLAIRVOYANT
+from .compared_runs import OPTIMUM, POLICIES, Optimum, Tell, make_all, record_path
 from .conditions import Condition, check
 from .contenders import CONTENDERS
 from .excitation import ExcitationRun, excitation_runs
 from .ideal import Ideal
-from .metrics import GameValue, RunMetrics, dissipation_margin, distribution, run_metrics
-from .pool import Work, run_tasks
+from .metrics import GameValue, RunMetrics, dissipation_margin, distribution
 from .run_conditions import run_conditions
-from .runs import contender_record, optimal_record
 from .scenario import Scenario
 from .theory import Theory, theory
 
-Tell = Callable[[str, float], None]
-
-EVERYWHERE = ("learned", "linear", "lqr", "pid", "mpc")  # run from every state
-POLICIES = (*EVERYWHERE, "quadratic", "gradient")  # from the scenario's own
 JUDGED = ("learned", "linear")  # a run of theirs that ends early is a fault
-OPTIMUM = "optimal"
 X_Y = Field(0, 1)
 
 
@@ -61,15 +53,6 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Optimum:
-    """What a comparison keeps of the optimum from one state; a `fault` where there is none."""
-
-    value: float | None
-    value_error: float
-    fault: str = ""
-
-
-@dataclass(frozen=True)
 class Comparison:
     """What `compare` found.
 
@@ -77,9 +60,11 @@ class Comparison:
     ----------
     scenario, station : what was compared
     records : closed-loop records from the scenario's initial state
-    optimal : record of the offline optimum from there
+    optimal : record of the offline optimum of the game from there
+    clairvoyant : record of the clairvoyant optimum from there in `disturbed` mode; None without one
     all_metrics : of each policy from each state that it was run from, the scenario's first
-    optima : from each state
+    optima : of the game, from each state
+    clairvoyant_optima : likewise, in `disturbed` mode; else none
     margins : of each record from the scenario's state, in `disturbed` mode: the dissipation margin
     analysis : errors along and around the learned run, ideal weights; see `analysis_record`
     excitation : runs without and with samples
@@ -91,13 +76,25 @@ class Comparison:
     station: StationKeeping
     records: dict[str, xr.Dataset]
     optimal: xr.Dataset
+    clairvoyant: xr.Dataset | None
     all_metrics: dict[str, list[RunMetrics]]
     optima: list[Optimum]
+    clairvoyant_optima: list[Optimum]
     margins: dict[str, float]
     analysis: xr.Dataset
     excitation: dict[str, list[ExcitationRun]]
     conditions: list[Condition]
     theory: Theory | None
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether a real disturbance takes the place of the game's second player."""
+        return self.scenario.simulation.mode == "disturbed"
+
+    @property
+    def reference(self) -> xr.Dataset:
+        """Record of the optimum that figures show: what regret refers to, else the game's."""
+        return self.optimal if self.clairvoyant is None else self.clairvoyant
 
     @property
     def metrics(self) -> dict[str, RunMetrics]:
@@ -116,13 +113,13 @@ class Comparison:
 
     @property
     def regrets(self) -> dict[str, list[float | None]]:
-        """Of each policy from each state that has an optimum; None where a run ended early."""
+        """Of each policy from each state that has an optimum; None where a run ended early.
+
+        Against the game's optimum, in `disturbed` mode against the clairvoyant one.
+        """
+        references = self.clairvoyant_optima if self.disturbed else self.optima
         return {
-            name: [
-                run.regret
-                for run, optimum in zip(runs, self.optima, strict=False)
-                if optimum.value is not None
-            ]
+            name: [run.regret for run, optimum in zip(runs, references, strict=False) if optimum.value]
             for name, runs in self.all_metrics.items()
         }
 
@@ -130,15 +127,20 @@ class Comparison:
     def regret(self) -> dict[str, dict[str, Any]] | None:
         """For each policy median, p90, max and the number that diverged.
 
-        None in `disturbed` mode, where the game's optimum is no reference.
+        None in `disturbed` mode without a clairvoyant optimum: the game's is no reference there.
         """
-        if self.scenario.simulation.mode != "game":
+        if self.disturbed and (self.clairvoyant is None or not self.clairvoyant_optima[0].value):
             return None
         return {name: distribution(regrets) for name, regrets in self.regrets.items()}
 
     @property
     def too_short(self) -> list[str]:
-        """Policies whose run ended with more than a thousandth of the cost still to come."""
+        """Policies whose regret has more than a thousandth of the cost still to come.
+
+        None in `disturbed` mode, where regret is that of the time of the run.
+        """
+        if self.disturbed:
+            return []
         return [name for name, metrics in self.metrics.items() if (metrics.rest_share or 0.0) > 1e-3]
 
     @property
@@ -149,11 +151,23 @@ class Comparison:
             where = "" if number == 1 else f"state {number}, "
             if optimum.fault:
                 found.append(f"{where}offline optimum: {optimum.fault}")
+            if self.disturbed:
+                found += [f"{where}clairvoyant optimum: {fault}" for fault in self._doubts(number - 1)]
             for name in JUDGED:
                 stopped = self.all_metrics[name][number - 1].stopped
                 if stopped:
                     found.append(f"{where}{CONTENDERS[name].label}: {stopped}")
         return found
+
+    def _doubts(self, state: int) -> list[str]:
+        """Return why the clairvoyant optimum from a state can't be relied on."""
+        optimum = self.clairvoyant_optima[state]
+        doubts = [optimum.fault] if optimum.fault else []
+        for name, runs in self.all_metrics.items():
+            regret = runs[state].regret if state < len(runs) else None
+            if regret is not None and regret < -optimum.value_error:
+                doubts.append(f"the run of {CONTENDERS[name].label} costs {-100 * regret:.2g} % less")
+        return doubts
 
 
 def compare(plan: Plan, folder: Path, *, n_workers: int = 1, tell: Tell | None = None) -> Comparison:
@@ -173,13 +187,11 @@ def compare(plan: Plan, folder: Path, *, n_workers: int = 1, tell: Tell | None =
     told = tell if tell is not None else _silent
     scenario, station = plan.scenario, plan.scenario.station_keeping()
     scenarios = plan.scenarios()
-    found, optima = _made(scenarios, folder, n_workers, told)
-    if optima[0].value is None:
-        raise RunError(optima[0].fault)
-    if scenario.simulation.mode == "game":
-        for runs in found.values():
-            runs[:] = [_regretted(run, optima[i].value) for i, run in enumerate(runs)]
-    records = {name: load(_path(folder, 0, name)) for name in POLICIES}
+    made = make_all(scenarios, folder, n_workers, told)
+    if made.optima[0].value is None:
+        raise RunError(made.optima[0].fault)
+    records = {name: load(record_path(folder, 0, name)) for name in POLICIES}
+    seen = bool(made.clairvoyant) and made.clairvoyant[0].value is not None
     told("errors along the way", 0.0)
     analysis = analysis_record(scenario, records["learned"], plan.field, folder / "analysis.nc")
     ideal = ideal_of(station, analysis)
@@ -189,9 +201,11 @@ def compare(plan: Plan, folder: Path, *, n_workers: int = 1, tell: Tell | None =
         scenario=scenario,
         station=station,
         records=records,
-        optimal=load(_path(folder, 0, OPTIMUM)),
-        all_metrics=found,
-        optima=optima,
+        optimal=load(record_path(folder, 0, OPTIMUM)),
+        clairvoyant=load(record_path(folder, 0, CLAIRVOYANT)) if seen else None,
+        all_metrics=made.metrics,
+        optima=made.optima,
+        clairvoyant_optima=made.clairvoyant,
         margins=_margins(station, records) if scenario.simulation.mode == "disturbed" else {},
         analysis=analysis,
         excitation=excitation_runs(scenario),
@@ -206,77 +220,6 @@ def _conditions(
     bounds = None if ideal is None else ideal.bounds
     listed = check(scenario, bounds, float(learned["rank_margin"].min()))
     return listed + run_conditions(scenario, learned, watched)
-
-
-@dataclass(frozen=True)
-class _Task:
-    """A policy, or the optimum, from one of the states."""
-
-    state: int
-    what: str
-
-
-def _made(
-    scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
-) -> tuple[dict[str, list[RunMetrics]], list[Optimum]]:
-    """Make all records; return the figures of merit and the optima, in the order of the states."""
-    tasks = [
-        _Task(state, what)
-        for state in range(len(scenarios))
-        for what in (OPTIMUM, *(EVERYWHERE if state else POLICIES))
-    ]
-    answers: dict[_Task, RunMetrics | Optimum] = {}
-    tell("runs", 0.0)
-    with closing(run_tasks(_worker, (scenarios, folder), tasks, n_workers)) as events:
-        for event in events:
-            if event.message is None:
-                raise RunError(str(event.failure))
-            answers[tasks[event.task]] = event.message
-            tell("runs", len(answers) / len(tasks))
-    metrics: dict[str, list[RunMetrics]] = {name: [] for name in POLICIES}
-    optima = []
-    for task in tasks:
-        answer = answers[task]
-        if isinstance(answer, Optimum):
-            optima.append(answer)
-        else:
-            metrics[task.what].append(answer)
-    return metrics, optima
-
-
-def _worker(shipment: tuple[list[Scenario], Path]) -> Work[_Task, RunMetrics | Optimum]:
-    """Return what makes one record and tells its figures of merit."""
-    scenarios, folder = shipment
-    station = scenarios[0].station_keeping()
-    solver = OfflineSolver(station.problem, scenarios[0].offline)
-
-    def work(task: _Task) -> Iterator[RunMetrics | Optimum]:
-        scenario, path = scenarios[task.state], _path(folder, task.state, task.what)
-        if task.what == OPTIMUM:
-            yield _optimum(scenario, solver, path)
-        else:
-            yield run_metrics(contender_record(scenario, task.what, path), station, None)
-
-    return work
-
-
-def _optimum(scenario: Scenario, solver: OfflineSolver, path: Path) -> Optimum:
-    try:
-        attributes = optimal_record(scenario, solver, path).attrs
-    except RunError as error:
-        return Optimum(None, 0.0, str(error))
-    value, accuracy = float(attributes["value"]), float(attributes["value_error"])
-    return Optimum(value, accuracy, str(attributes["faults"]))
-
-
-def _path(folder: Path, state: int, what: str) -> Path:
-    return folder / (f"state-{state + 1}-{what}.nc" if state else f"{what}.nc")
-
-
-def _regretted(run: RunMetrics, optimum: float | None) -> RunMetrics:
-    if run.cost is None or optimum is None:
-        return run
-    return replace(run, regret=(run.cost - optimum) / optimum)
 
 
 def _margins(station: StationKeeping, records: dict[str, xr.Dataset]) -> dict[str, float]:

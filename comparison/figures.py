@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from scipy.optimize import linprog
 
 from ..symbolic import RunError, StationKeeping, Thrusters
+from .clairvoyant import optimum_name
 from .compare import Comparison
 from .learning_figures import draw_bellman, draw_errors, draw_excitation, draw_field, draw_weights
 from .monitor_figure import draw_monitor
@@ -40,7 +41,7 @@ _EARTH = ["along x [N]", "along y [N]", "along z [N]", "for φ [N m]", "for θ [
 
 def draw_all(comparison: Comparison, page: Page) -> None:
     """Draw every figure of a comparison on `page`, in the order in which a report shows them."""
-    station, optimal, records = comparison.station, comparison.optimal, comparison.records
+    station, optimal, records = comparison.station, comparison.reference, comparison.records
     learned = records["learned"]
     if comparison.regret is not None:
         draw_regrets(page, comparison)
@@ -63,11 +64,11 @@ def draw_all(comparison: Comparison, page: Page) -> None:
 
 
 def draw_states(page: Page, learned: xr.Dataset, optimal: xr.Dataset, *, rates: bool = False) -> None:
-    """Draw pose, or its rates, against time: learned beside optimal."""
+    """Draw pose, or its rates, against time: learned beside optimal, or beside clairvoyant."""
     name, title = ("rates", "Rates") if rates else ("states", "Pose")
     first = 6 if rates else 0
     end = float(learned["time"][-1])
-    with page.figure(name, f"{title}: learned beside optimal", 2, 3, 5.2) as panels:
+    with page.figure(name, f"{title}: learned beside {optimum_name(optimal)}", 2, 3, 5.2) as panels:
         for i, (axes, (label, unit)) in enumerate(zip(panels, _RATES if rates else _POSE, strict=True)):
             for record, color, run, style in _pair(learned, optimal):
                 values = unit * record["zeta"].values[:, first + i]
@@ -147,7 +148,7 @@ def wrench_limits(thrusters: Thrusters, axis: int) -> tuple[float, float]:
 
 
 def _pair(learned: xr.Dataset, optimal: xr.Dataset) -> list[tuple[xr.Dataset, str, str, str]]:
-    return [(learned, LEARNED, "learned", "-"), (optimal, OPTIMAL, "optimal", "--")]
+    return [(learned, LEARNED, "learned", "-"), (optimal, OPTIMAL, optimum_name(optimal), "--")]
 
 
 def _mark_limits(axes: Axes, low: float, high: float) -> str:

@@ -21,7 +21,9 @@ class RunMetrics:
     ----------
     cost : integral of r of (5) in `game` mode, of ζ'Qζ + u_1'R u_1 in `disturbed` mode, plus
         ζ(T)'P ζ(T) for the rest; None if the run ended early
-    regret : (cost - V*) / V*; None without an optimum or if the run ended early
+    running_cost : the integral alone; None if the run ended early
+    regret : (cost - V*) / V*, or in `disturbed` mode (running cost - V_c) / V_c with the clairvoyant
+        optimum; None without an optimum or if the run ended early
     position_rms : [m]; None if the run ended before it began
     excursion : largest distance from the station [m]; likewise
     effort : integral of |τ_b force|^2 [N^2 s]
@@ -36,6 +38,7 @@ class RunMetrics:
     """
 
     cost: float | None
+    running_cost: float | None
     regret: float | None
     position_rms: float | None
     excursion: float | None
@@ -56,16 +59,18 @@ def run_metrics(record: xr.Dataset, station: StationKeeping, optimum: float | No
     """
     stopped = str(record.attrs["stopped"]) or None
     zeta, time = record["zeta"].values, record["time"].values
-    cost = rest_share = None
+    cost = running_cost = rest_share = None
     if stopped is None:
         rest = float(zeta[-1] @ station.problem.P @ zeta[-1])
-        cost = float(cost_to_date(record)[-1]) + rest
+        running_cost = float(cost_to_date(record)[-1])
+        cost = running_cost + rest
         rest_share = rest / cost if cost > 0.0 else 0.0
     tau_b = record["tau_b"].values
     distance = np.linalg.norm(zeta[:, :3], axis=1)
     saturated = record.attrs.get("saturated")
     return RunMetrics(
         cost=cost,
+        running_cost=running_cost,
         regret=None if cost is None or optimum is None else (cost - optimum) / optimum,
         position_rms=float(np.sqrt(np.mean(distance**2))) if len(time) else None,
         excursion=float(distance.max()) if len(time) else None,

@@ -10,11 +10,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from ..symbolic.vehicle import Array
+from .clairvoyant import optimum_name
 from .contenders import CONTENDERS
 from .style import COLORS, Page, legend_below
 
 SHOWN = ("learned", "linear", "mpc", "pid")
 ARROWS = 12
+LABELS = {"optimal": "offline optimum", "clairvoyant": "clairvoyant optimum"}
 
 
 def draw_path(page: Page, records: Mapping[str, xr.Dataset], optimal: xr.Dataset) -> None:
@@ -23,7 +25,7 @@ def draw_path(page: Page, records: Mapping[str, xr.Dataset], optimal: xr.Dataset
     paths["optimal"] = optimal["zeta"].values
     with page.figure("path", "The way back to the station", 1, 2, 4.4, solid=0) as (solid, plan):
         _draw_space(solid, paths)
-        _draw_plan(plan, paths)
+        _draw_plan(plan, paths, LABELS[optimum_name(optimal)])
         legend_below(plan, columns=6)
 
 
@@ -41,10 +43,10 @@ def _draw_space(axes: Any, paths: Mapping[str, Array]) -> None:
     axes.set_box_aspect(None, zoom=0.84)
 
 
-def _draw_plan(axes: Axes, paths: Mapping[str, Array]) -> None:
+def _draw_plan(axes: Axes, paths: Mapping[str, Array], label_of_optimum: str) -> None:
     """Draw y to the right and x upwards, as on a chart; an arrow points where the bow does."""
     for name, zeta in paths.items():
-        label = CONTENDERS[name].label if name in CONTENDERS else "offline optimum"
+        label = CONTENDERS[name].label if name in CONTENDERS else label_of_optimum
         axes.plot(zeta[:, 1], zeta[:, 0], _style(name), color=COLORS[name], lw=1.4, label=label)
         if name in ("learned", "optimal"):
             x, y, psi = zeta[equal_distances(zeta[:, :2], ARROWS)][:, (0, 1, 5)].T

@@ -15,6 +15,8 @@ from ..online.record import read_parts
 from ..symbolic import InputError, require_state
 from ..symbolic.settings import validate
 from ..symbolic.vehicle import Array
+from .clairvoyant import KIND as CLAIRVOYANT
+from .clairvoyant import clairvoyant_or_failure, clairvoyant_provenance
 from .contenders import CONTENDERS
 from .files import as_settings, files_of
 from .runs import FORMAT, online_record, optimum_or_failure, optimum_provenance, trajectory_of
@@ -41,7 +43,7 @@ def load_run(path: Path) -> xr.Dataset:
             f"version runs those of format {FORMAT} again; make it again, or use the one that wrote it "
             f"(stationkeep {record.attrs.get('stationkeep_version', 'unknown')})"
         )
-    if kind not in CONTENDERS and not kind.startswith(OPTIMAL):
+    if kind not in CONTENDERS and kind != CLAIRVOYANT and not kind.startswith(OPTIMAL):
         raise InputError(
             f"'{path}' is a record of '{kind}', which can't be run again; known are optima and the "
             f"policies {', '.join(CONTENDERS)}"
@@ -66,7 +68,9 @@ def recorded_scenario(record: xr.Dataset) -> Scenario:
     scenario = validate(
         Scenario, data, "the record's scenario, which another version may have written,"
     )
-    if str(record.attrs["kind"]).startswith(OPTIMAL):  # doesn't depend on a basis, nor needs its file
+    if str(record.attrs["kind"]).startswith(
+        (OPTIMAL, CLAIRVOYANT)
+    ):  # doesn't depend on a basis, nor needs its file
         scenario = scenario.model_copy(
             update={"basis": scenario.basis.model_copy(update={"name": "drag"})}
         )
@@ -92,6 +96,8 @@ def run_again(record: xr.Dataset, folder: Path, progress: Progress | None = None
         make, duration = CONTENDERS[kind].make, scenario.simulation.duration
         tell = None if progress is None else lambda t: progress(t / duration)
         return online_record(scenario, policy=lambda: make(scenario), kind=kind, progress=tell)
+    if kind == CLAIRVOYANT:
+        return clairvoyant_or_failure(scenario, clairvoyant_provenance(scenario))
     zeta0, key = _start(kind)
     guess = _guess(folder, key) if key else None
     solver = OfflineSolver(scenario.station_keeping().problem, scenario.offline)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,7 @@ from ..offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
 from ..online import Policy, load, run, save, to_dataset
 from ..online.closed_loop import STATE_NAMES, Progress
 from ..online.record import versions
-from ..symbolic import InputError, RunError
+from ..symbolic import InputError, RunError, StationKeeping
 from ..symbolic.vehicle import Array
 from .contenders import contender
 from .files import with_files
@@ -28,7 +28,9 @@ FORMAT = 7  # of the records; raise it when what is in them, or how a run is mad
 OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
 
 
-def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -> dict[str, Any]:
+def provenance(
+    scenario: Scenario, kind: str, include: set[str] | Mapping[str, Any] | None = None
+) -> dict[str, Any]:
     """Return the attributes that say where a record comes from.
 
     `key` is the hash of what the numbers depend on: the settings (those named in `include`, or all),
@@ -43,7 +45,8 @@ def provenance(scenario: Scenario, kind: str, include: set[str] | None = None) -
     parts.append(repr(sorted(versions().items())))
     start = scenario.initial_weights() if include is None else None
     parts.append("" if start is None else start.tobytes().hex())
-    driven = scenario.plant_vehicle() if include is None else None
+    simulated = include is None or "simulation" in include
+    driven = scenario.plant_vehicle() if simulated else None
     plant = "" if driven is None else driven.model_dump_json()
     parts.append(plant)
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
@@ -148,12 +151,17 @@ def optimum_or_failure(
     except RunError as error:
         attributes = {
             **attributes,
-            **versions(),
             "failed": str(error),
             "certified_seconds": time.perf_counter() - started,
         }
-        return xr.Dataset({"zeta": ("state", zeta0)}, {"state": list(STATE_NAMES)}, attributes)
+        return failure_record(zeta0, attributes)
     return optimum_to_dataset(scenario, solution, attributes)
+
+
+def failure_record(zeta0: Array, attributes: dict[str, Any]) -> xr.Dataset:
+    """Return the record of a solve from ζ_0 that failed: the state, versions, no trajectory."""
+    attributes = attributes | versions()
+    return xr.Dataset({"zeta": ("state", zeta0)}, {"state": list(STATE_NAMES)}, attributes)
 
 
 def _solve(solver: OfflineSolver, zeta0: Array, guess: Trajectory | None) -> OfflineSolution:
@@ -183,23 +191,42 @@ def optimum_to_dataset(
     path, direct = solution.direct.trajectory, solution.direct
     station = scenario.station_keeping()
     u_control, u_disturbance = path.players(station.game)
+    local = station.game.local_cost(path.states[1:], u_control, u_disturbance)
+    dataset = path_dataset(station, path, u_control, local, attributes | _described(solution))
+    forces, units = ("node", "force"), {"units": "N, N m"}
+    more = {
+        "u_disturbance": (forces, u_disturbance, units),
+        "v": (forces, path.v, units),
+        "costate": (("state",), direct.costate, {"units": "cost per unit of the state"}),
+    }
+    return dataset.assign(more)
+
+
+def path_dataset(
+    station: StationKeeping,
+    path: Trajectory,
+    u_control: Array,
+    local: Array,
+    attributes: dict[str, Any],
+) -> xr.Dataset:
+    """Return the record of a collocated way: states, control, wrench and cost.
+
+    Parameters
+    ----------
+    u_control : (K d, 6) at the collocation points
+    local : (K d,) cost rate there
+    """
     tau_b = [
         station.model.kinematics(zeta[:6])[0].T @ (u + station.model.u_trim)
         for zeta, u in zip(path.states[1:], u_control, strict=True)
     ]
-    game = station.game
-    local = game.local_cost(path.states[1:], u_control, u_disturbance)
-    forces, states = ("node", "force"), ("time", "state")
-    units = {"units": "N, N m"}
+    forces, units = ("node", "force"), {"units": "N, N m"}
     data = {
-        "zeta": (states, path.states, {"units": "m, rad, m/s, rad/s"}),
+        "zeta": (("time", "state"), path.states, {"units": "m, rad, m/s, rad/s"}),
         "u_control": (forces, u_control, units),
-        "u_disturbance": (forces, u_disturbance, units),
-        "v": (forces, path.v, units),
         "tau_b": (forces, np.array(tau_b), units),
         "local_cost": (("node",), local, {"units": "cost/s"}),
         "cost": (("time",), path.quadrature(local), {"units": "cost"}),
-        "costate": (("state",), direct.costate, {"units": "cost per unit of the state"}),
     }
     coordinates = {
         "time": ("time", path.times, {"units": "s"}),
@@ -207,7 +234,7 @@ def optimum_to_dataset(
         "mesh": ("mesh", path.mesh, {"units": "s"}),
         "state": list(STATE_NAMES),
     }
-    return xr.Dataset(data, coordinates, attributes | _described(solution))
+    return xr.Dataset(data, coordinates, attributes)
 
 
 def _described(solution: OfflineSolution) -> dict[str, Any]:

@@ -15,26 +15,29 @@ from .style import COLORS, OPTIMAL, Page, legend_below, time_axis
 def draw_cost(page: Page, comparison: Comparison) -> None:
     """Draw the cost to date of each run, and how far it lies above the optimum's.
 
-    In `disturbed` mode the optimum is no reference, and the linear policy takes its place. The second
-    panel is cut where policies end that are far worse than the linear one.
+    In `disturbed` mode the optimum is the clairvoyant one; without it the linear policy takes its
+    place. The second panel is cut where policies end that are far worse than the linear one.
     """
     records = comparison.records
     end = max(float(record["time"][-1]) for record in records.values())
     above, unit = _above(comparison)
     last = {name: float(values[-1]) for name, (_, values) in above.items() if len(values)}
     title = "Cost: " + ", ".join(f"{name} {last[name]:.2f} {unit}" for name in ("learned", "linear"))
-    reference = "the optimum's" if comparison.regret is not None else "the linear policy's"
+    optimum = "the clairvoyant optimum" if comparison.disturbed else "the optimum"
+    reference = f"{optimum}'s" if comparison.regret is not None else "the linear policy's"
     with page.figure("cost", f"{title} above {reference}", 1, 2, 4.4) as (total, excess):
         for name, record in records.items():
-            label = f"{CONTENDERS[name].label}, {last.get(name, np.nan):.2f} {unit}"
+            early = comparison.metrics[name].stopped
+            outcome = "ended early" if early else f"{last.get(name, np.nan):.2f} {unit}"
+            label = f"{CONTENDERS[name].label}, {outcome}"
             layer = 3 if name == "learned" else 2
             total.plot(
                 record["time"], cost_to_date(record), label=label, color=COLORS[name], zorder=layer
             )
             excess.plot(*above[name], color=COLORS[name], zorder=layer)
         if comparison.regret is not None:
-            optimal = comparison.optimal
-            total.plot(optimal["time"], optimal["cost"], "--", color=OPTIMAL, label="optimum", zorder=4)
+            best, label = comparison.reference, optimum.removeprefix("the ")
+            total.plot(best["time"], best["cost"], "--", color=OPTIMAL, label=label, zorder=4)
             excess.axhline(0.0, color=OPTIMAL, ls="--")
         far = 3.0 * max(abs(last["linear"]), abs(last["learned"]), 0.1)
         near = [values for _, values in above.values() if len(values) and abs(values[-1]) < far]
@@ -57,7 +60,8 @@ def draw_regrets(page: Page, comparison: Comparison) -> None:
     found = found or comparison.regrets
     count = comparison.n_states
     states = "one state" if count == 1 else f"{count} states"
-    title = f"Regret from {states}: how much dearer than the optimum"
+    optimum = "clairvoyant optimum" if comparison.disturbed else "optimum"
+    title = f"Regret from {states}: how much dearer than the {optimum}"
     with page.figure("regret", title, 1, 1, 0.42 * len(found) + 1.6) as (axes,):
         for row, (name, regrets) in enumerate(found.items()):
             percent = 100.0 * np.array([r for r in regrets if r is not None and r > 0.0])
@@ -67,7 +71,7 @@ def draw_regrets(page: Page, comparison: Comparison) -> None:
             if len(percent):
                 middle = float(np.median(percent))
                 axes.plot([middle] * 2, [row - 0.36, row + 0.36], color="black", lw=2.0)
-                label += f", {middle:.2g} %"
+                label += f", {middle:.2g} %" if middle < 100.0 else f", {middle:.0f} %"
             lost = sum(r is None for r in regrets)
             axes.text(0.01, row + 0.28, label, transform=axes.get_yaxis_transform(), fontsize=8)
             if lost:
@@ -130,7 +134,7 @@ def _above(comparison: Comparison) -> tuple[dict[str, tuple[Array, Array]], str]
     """Return times and cost to date above the reference's, for each run, and the unit."""
     records = comparison.records
     if comparison.regret is not None:
-        optimal = comparison.optimal
+        optimal = comparison.reference
         time, cost = optimal["time"].values, optimal["cost"].values
         factor, unit = 100.0 / float(optimal.attrs["value"]), "%"
     else:

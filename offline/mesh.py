@@ -19,6 +19,22 @@ def graded_mesh(horizon: float, n_intervals: int, grading: float) -> Array:
     return np.asarray(horizon * (np.expm1(grading * s) / np.expm1(grading)))
 
 
+def growing_mesh(horizon: float, breaks: Array, *, shortest: float, longest: float) -> Array:
+    """Return mesh points on [0, T] with one at every break, (K + 1,) [s].
+
+    After 0 and after each break the intervals grow from `shortest` by halves to `longest`.
+    """
+    inner = np.unique(breaks[(breaks > 0.0) & (breaks < horizon)])
+    points = [0.0]
+    for end in (*inner.tolist(), horizon):
+        h = shortest
+        while end - points[-1] > 1.5 * h:
+            points.append(points[-1] + h)
+            h = min(1.5 * h, longest)
+        points.append(end)
+    return np.array(points)
+
+
 def aligned_mesh(
     mesh: Array, events: Array, *, closest: float = 0.2, fixed: Array | None = None
 ) -> Array:

@@ -85,14 +85,19 @@ def refine(
 def interval_errors(direct: DirectSolver, refined: Refined) -> Array:
     """Return the share e_i of each interval in the relative value error, shape (K,)."""
     coarse, fine = refined.solution.trajectory, refined.better.trajectory
+    return input_errors(coarse, fine, direct.problem.game.R_eff) / _size(refined.solution)
+
+
+def input_errors(coarse: Trajectory, fine: Trajectory, R: Array) -> Array:
+    """Return ∫ (v_fine - v_coarse)'R (v_fine - v_coarse) dt on each interval of their mesh, (K,)."""
     times = fine.times[1:]
     d = fine.degree
     # a Radau point at an interval's end belongs to it, not to the next
     inside = times - 1e-9 * np.repeat(np.diff(fine.mesh), d)
     gap = coarse.sample(inside)[1] - fine.v
-    density = np.sum((gap @ direct.problem.game.R_eff) * gap, axis=1).reshape(-1, d)
+    density = np.sum((gap @ R) * gap, axis=1).reshape(-1, d)
     _, weights = fine.rule.coefficients
-    return np.asarray(np.diff(fine.mesh) * (density @ weights) / _size(refined.solution))
+    return np.asarray(np.diff(fine.mesh) * (density @ weights))
 
 
 def _attempt(

@@ -12,6 +12,7 @@ from scipy.interpolate import BarycentricInterpolator
 from ..symbolic import RunError
 from ..symbolic.integration import integrate
 from ..symbolic.vehicle import Array
+from .derivatives import PointDerivatives
 from .second_order import SecondOrder, second_order
 from .stage import Stage
 from .trajectory import Trajectory
@@ -43,19 +44,36 @@ class Response:
 
 
 class Responder:
-    """Solves one stage on meshes of any size; the programs are built once a size."""
+    """Solves one stage on meshes of any size; the programs are built once a size.
 
-    def __init__(self, stage: Stage, degree: int, *, patience: int = 80) -> None:
+    Parameters
+    ----------
+    degree : of the Radau collocation
+    patience : IPOPT's limit on its iterations
+    derivatives : of the stage, shared with others; made here if None
+    """
+
+    def __init__(
+        self,
+        stage: Stage,
+        degree: int,
+        *,
+        patience: int = 80,
+        derivatives: PointDerivatives | None = None,
+    ) -> None:
         self.stage = stage
         self.degree = degree
         self.patience = patience
+        self.derivatives = PointDerivatives(stage) if derivatives is None else derivatives
         self._programs: dict[int, Transcription] = {}
 
     def program(self, mesh: Array) -> Transcription:
         """Return the program for a mesh."""
         K = len(mesh) - 1
         if K not in self._programs:
-            self._programs[K] = Transcription(self.stage, K, self.degree, patience=self.patience)
+            self._programs[K] = Transcription(
+                self.stage, K, self.degree, derivatives=self.derivatives, patience=self.patience
+            )
         return self._programs[K]
 
     def times(self, mesh: Array) -> Array:

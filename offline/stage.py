@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import casadi
+import numpy as np
 from casadi import DM, SX
 
 from ..symbolic import Kernel, Problem
@@ -102,6 +103,19 @@ def against_disturbance(problem: Problem, u_disturbance: SX, parameters: SX, ter
         running=output_cost(problem, w) - attenuated,
         terminal=terminal,
     )
+
+
+def against_known(zeta: SX, w: SX, t: SX, rate: SX, Q: Array, R: Array) -> Stage:
+    """Return the control's problem where all that disturbs is known: L = ζ'Qζ + w'R w and E = 0.
+
+    Parameters
+    ----------
+    zeta, w, t : symbols of the state (n,), the control (k,) and the time, the stage's parameter
+    rate : (n,) expression of ζ_dot in them
+    """
+    running = zeta.T @ DM(Q) @ zeta + w.T @ DM(R) @ w
+    n = int(zeta.shape[0])
+    return Stage(zeta, w, parameters=t, rate=rate, running=running, terminal=np.zeros((n, n)))
 
 
 def output_cost(problem: Problem, u_control: SX) -> SX:

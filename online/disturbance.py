@@ -10,7 +10,9 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import casadi
 import numpy as np
+from casadi import DM, SX
 
 from ..symbolic.vehicle import Array
 from .settings import DisturbanceSettings
@@ -51,6 +53,20 @@ class DisturbanceSource(Protocol):
         ...
 
 
+class KnownSource(DisturbanceSource, Protocol):
+    """A source that also gives d(t) at a position as an expression, to be differentiated."""
+
+    def expression(self, t: SX, position: SX) -> tuple[SX, SX, SX]:
+        """Return `at` as expressions: force (6,), water velocity (3,) and acceleration (3,).
+
+        Parameters
+        ----------
+        t : scalar [s]
+        position : (3,) in the earth frame, from the station [m]
+        """
+        ...
+
+
 class Force:
     """A constant or sinusoidal force, amplitude · sin(2π f (t - start)), from `start` on."""
 
@@ -67,6 +83,13 @@ class Force:
             factor *= math.sin(2.0 * np.pi * self.frequency * (t - self.start))
         return Disturbance(factor * self.amplitude, self._still, self._still)
 
+    def expression(self, t: SX, position: SX) -> tuple[SX, SX, SX]:
+        """Return the force at time t as an expression; the water is still."""
+        factor = SX(t >= self.start)
+        if not self.steady:
+            factor *= casadi.sin(2.0 * np.pi * self.frequency * (t - self.start))
+        return factor * DM(self.amplitude), SX(3, 1), SX(3, 1)
+
 
 class CurrentStep:
     """Water that moves at a constant velocity from `start` on."""
@@ -79,6 +102,10 @@ class CurrentStep:
     def at(self, t: float, position: Array) -> Disturbance:
         """Return the current at time t; the step's infinite acceleration is left out."""
         return Disturbance(np.zeros(6), (t >= self.start) * self.velocity, np.zeros(3))
+
+    def expression(self, t: SX, position: SX) -> tuple[SX, SX, SX]:
+        """Return the current at time t as an expression."""
+        return SX(6, 1), SX(t >= self.start) * DM(self.velocity), SX(3, 1)
 
 
 def jonswap(omega: Array, height: float, period: float, peak_enhancement: float = 3.3) -> Array:
@@ -143,8 +170,21 @@ class Waves:
             np.append(horizontal_rate * self.direction, down_rate),
         )
 
+    def expression(self, t: SX, position: SX) -> tuple[SX, SX, SX]:
+        """Return orbital velocity and acceleration as expressions; no force."""
+        along = DM(self.direction).T @ position[:2]
+        angle = DM(self.wavenumber) * along - DM(self.omega) * t + DM(self.phase)
+        depth = casadi.fmax(self.depth + position[2], 0.0)
+        speed = DM(self.amplitude * self.omega) * casadi.exp(-DM(self.wavenumber) * depth)
+        rate, cosine, sine = speed * DM(self.omega), casadi.cos(angle), casadi.sin(angle)
+        return (
+            SX(6, 1),
+            casadi.vertcat(DM(self.direction) * casadi.dot(speed, cosine), -casadi.dot(speed, sine)),
+            casadi.vertcat(DM(self.direction) * casadi.dot(rate, sine), casadi.dot(rate, cosine)),
+        )
 
-def build_disturbance(settings: DisturbanceSettings) -> DisturbanceSource:
+
+def build_disturbance(settings: DisturbanceSettings) -> KnownSource:
     """Return the source that the settings describe."""
     if settings.kind == "current":
         return CurrentStep(np.array(settings.velocity), settings.start)

@@ -124,7 +124,7 @@ class HeldPlant:
 @lru_cache(maxsize=8)
 def _kernels(station: StationKeeping, vehicle: str | None) -> tuple[Kernel, Kernel]:
     """Return the rates under held wrenches and a step of them; `vehicle` is the true one, as JSON."""
-    rates = _held_rates(station, None if vehicle is None else Vehicle.model_validate_json(vehicle))
+    rates = held_rates(station, None if vehicle is None else Vehicle.model_validate_json(vehicle))
     step = _held_step(rates)
     compiled = station.model.compiled
     return (
@@ -152,7 +152,7 @@ def _held_step(rates: casadi.Function) -> casadi.Function:
     )
 
 
-def _held_rates(station: StationKeeping, true: Vehicle | None = None) -> casadi.Function:
+def held_rates(station: StationKeeping, true: Vehicle | None = None) -> casadi.Function:
     """Return ζ_dot of the true vehicle, the cost rates, u_1 and d under held body wrenches."""
     model, game = station.model, station.game
     vehicle, zeta = model.vehicle, model.zeta

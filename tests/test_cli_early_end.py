@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stationkeep.comparison import Scenario, clairvoyant
 from stationkeep.offline import OfflineSolution, OfflineSolver, Trajectory
 from stationkeep.online import load
 from stationkeep.symbolic import RunError
@@ -155,15 +156,49 @@ def test_compare_of_runs_that_start_out_of_bounds(capsys: Capture) -> None:
 
 
 @pytest.mark.slow
-def test_compare_in_disturbed_mode_has_no_regret(user_folder: Path, capsys: Capture) -> None:
+def test_compare_in_disturbed_mode_has_regret_against_the_clairvoyant_optimum(
+    user_folder: Path, capsys: Capture
+) -> None:
     disturbance = ("kind='constant'", "force=[1,0,0,0,0,0]")
     settings = sets(*QUICK, *COARSE, "simulation.mode='disturbed'")
     settings += sets(*(f"simulation.disturbance.{text}" for text in disturbance))
-    answer = call(capsys, "compare", "--json", "--quiet", "--n-states", "1", "--out", "out", *settings)
+    words = ("compare", "--json", "--quiet", "--n-states", "1", "--workers", "1", "--out", "out")
+    answer = call(capsys, *words, *settings)
     assert answer.code == 0
     printed = answer.json()
     assert set(printed["regret"]) >= {"learned", "linear"}
-    assert set(printed["regret"].values()) == {None}
-    assert "no reference" in printed["notes"]["regret"]
+    assert all(one["median"] > -1e-9 for one in printed["regret"].values() if not one["diverged"])
+    assert "V_c is the clairvoyant" in printed["notes"]["regret"]
+    assert 0.0 < printed["clairvoyant"]["value_error"] < 1e-5
+    kept = load(user_folder / "out" / "records" / "clairvoyant.nc")
+    assert kept.attrs["value"] == printed["clairvoyant"]["value"]
+    linear = load(user_folder / "out" / "records" / "linear.nc")["cost"].values[-1]
+    regret = (linear - kept.attrs["value"]) / kept.attrs["value"]
+    assert printed["regret"]["linear"]["median"] == pytest.approx(regret, rel=1e-12)
     assert all(printed["dissipation_margin"][name] > 0.0 for name in ("learned", "linear"))
     assert (user_folder / "out" / "report.html").is_file()
+
+
+@pytest.mark.slow
+def test_compare_goes_on_without_a_clairvoyant_optimum(
+    user_folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(scenario: Scenario) -> None:
+        raise RunError("IPOPT stopped with 'Maximum_Iterations_Exceeded'")
+
+    monkeypatch.setattr(clairvoyant, "clairvoyant", failing)
+    settings = sets(
+        *QUICK, *COARSE, "simulation.mode='disturbed'", "simulation.disturbance.kind='waves'"
+    )
+    words = ("compare", "--json", "--quiet", "--n-states", "1", "--workers", "1", "--out", "out")
+    answer = call(capsys, *words, *settings)
+    assert answer.code == 1
+    printed = answer.json()
+    assert set(printed["regret"].values()) == {None}
+    assert printed["clairvoyant"] is None
+    assert "no clairvoyant optimum" in printed["notes"]["clairvoyant"]
+    assert printed["faults"] == [
+        "clairvoyant optimum: IPOPT stopped with 'Maximum_Iterations_Exceeded'"
+    ]
+    report = (user_folder / "out" / "report.html").read_text(encoding="utf-8")
+    assert "There is no clairvoyant optimum" in report

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import casadi
 import numpy as np
 import pytest
+from casadi import SX
 from scipy.integrate import quad
 from stationkeep.online import DisturbanceSettings, build_disturbance
 from stationkeep.online.disturbance import GRAVITY, DisturbanceSource, Waves, jonswap
@@ -164,6 +166,33 @@ def test_waves_repeat_by_seed_only() -> None:
     for t in (0.0, 1.3):
         np.testing.assert_array_equal(first.at(t, HERE).water_velocity, same.at(t, HERE).water_velocity)
         assert np.all(first.at(t, HERE).water_velocity != other.at(t, HERE).water_velocity)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        DisturbanceSettings(),
+        DisturbanceSettings(kind="constant", force=(1.0, -2.0, 3.0, 0.1, 0.2, -0.3), start=2.0),
+        DisturbanceSettings(kind="sinusoid", force=(1.0, -2.0, 3.0, 0.1, 0.2, -0.3), start=0.5),
+        DisturbanceSettings(kind="current", velocity=(0.25, -0.1, 0.05), start=2.0),
+        DisturbanceSettings(kind="waves", wave_heading=30.0, depth=2.0, seed=4),
+    ],
+    ids=lambda settings: settings.kind,
+)
+def test_the_expression_is_the_disturbance(settings: DisturbanceSettings) -> None:
+    """At any time and place, at the very instant of the step and above the surface too."""
+    source, t, position = build_disturbance(settings), SX.sym("t"), SX.sym("position", 3)
+    function = casadi.Function("d", [t, position], list(source.expression(t, position)))
+    rng = np.random.default_rng(3)
+    times = [0.0, np.nextafter(2.0, 0.0), 2.0, *rng.uniform(0.0, 60.0, 20)]
+    for now in times:
+        for place in (*rng.uniform(-2.0, 2.0, (3, 3)), np.array([0.0, 1.0, -5.0])):
+            here = source.at(float(now), place)
+            found = [np.array(part).ravel() for part in function(float(now), place)]
+            for part, name in zip(
+                found, ("force", "water_velocity", "water_acceleration"), strict=True
+            ):
+                np.testing.assert_allclose(part, getattr(here, name), rtol=1e-12, atol=1e-13)
 
 
 FORCE = (1.0, -2.0, 3.0, 0.1, 0.2, -0.3)
