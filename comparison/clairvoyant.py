@@ -76,7 +76,7 @@ class SelfCheck:
 
 def optimum_name(record: xr.Dataset) -> str:
     """Return what a figure calls the record of an optimum: optimal that of the game, or clairvoyant."""
-    return KIND if record.attrs["kind"] == KIND else "optimal"
+    return KIND if record.attrs.get("kind") == KIND else "optimal"
 
 
 def clairvoyant_record(scenario: Scenario, path: Path | None = None) -> xr.Dataset:
