@@ -93,7 +93,8 @@ def _clairvoyant(comparison: Comparison) -> dict[str, Any] | None:
         return None
     attributes = comparison.clairvoyant.attrs
     names = ("value", *CLAIRVOYANT_CHECK, "rounds", "intervals", "iterations", "seconds")
-    return {name: attributes[name].item() for name in names}
+    numbers = {name: attributes[name].item() for name in names}
+    return {name: None if number != number else number for name, number in numbers.items()}
 
 
 def _commands(options: argparse.Namespace) -> list[str]:

@@ -115,8 +115,9 @@ def clairvoyant_or_failure(scenario: Scenario, attributes: dict[str, Any]) -> xr
 def _described(found: Clairvoyant, check: SelfCheck) -> dict[str, Any]:
     size = max(found.value, np.finfo(float).tiny)
     gap = abs(check.cost - found.value) / size
-    error = found.mesh_error + gap
-    faults = []
+    confirmed = np.isfinite(found.mesh_error)
+    error = gap + (found.mesh_error if confirmed else 0.0)
+    faults = [] if confirmed else ["one degree more did not converge, and only integration checks it"]
     if not error <= LARGEST_ERROR:
         faults.append(f"the value's relative error is {error:.1e}, over {LARGEST_ERROR:.0e}")
     if not found.second_order.holds:

@@ -49,7 +49,8 @@ class Clairvoyant:
     ----------
     value : V_c
     path : trajectory; its input is u_1
-    mesh_error : relative change of the value by one degree
+    mesh_error : relative change of the value by one degree; NaN where IPOPT did not converge with one
+        more, and the value is that of degree d
     second_order : whether it is a strict local minimum
     starts : (s,) cost reached from each start on the first mesh, NaN where IPOPT did not converge
     rounds : of refinement
@@ -73,6 +74,7 @@ class _Pair:
 
     coarse: Response
     fine: Response
+    confirmed: bool = True
 
     @property
     def size(self) -> float:
@@ -80,7 +82,9 @@ class _Pair:
 
     @property
     def error(self) -> float:
-        """Relative change of the cost by the degree."""
+        """Relative change of the cost by the degree; NaN where degree d + 1 did not converge."""
+        if not self.confirmed:
+            return np.nan
         return abs(self.fine.cost - self.coarse.cost) / self.size
 
 
@@ -161,14 +165,12 @@ class ClairvoyantSolver:
         )
 
     def _confirmed(self, zeta0: Array, found: list[Response]) -> _Pair:
-        """Return the pair of the cheapest answer that one degree more confirms."""
-        failure = RunError("there is no answer")
-        for coarse in sorted(found, key=lambda response: response.cost):
-            try:
+        """Return the pair of the cheapest answer that a degree more confirms, else of the cheapest."""
+        ordered = sorted(found, key=lambda response: response.cost)
+        for coarse in ordered:
+            with suppress(RunError):
                 return _Pair(coarse, self._continued(self._fine, zeta0, self._mesh, coarse.path))
-            except RunError as error:
-                failure = error
-        raise failure
+        return _Pair(ordered[0], ordered[0], confirmed=False)
 
     def _refined(self, zeta0: Array, pair: _Pair) -> _Pair:
         """Return the pair on a mesh with the intervals halved whose error of the input is too large."""
