@@ -251,20 +251,19 @@ void normal(const table *t, double *matrix) {
 /* x (m) <- (L L')^-1 x, L the lower triangle of a column-major (m, m) matrix; four columns at a time, whose
    entries of x would otherwise wait for each other through memory */
 static void solve(integer m, const double *L, double *x) {
-  const integer whole = m / 4 * 4;
   for (integer j = 0; j < m; j += 4) {
-    const integer end = j < whole ? j + 4 : m;
+    const integer end = j + 4 < m ? j + 4 : m;
     for (integer a = j; a < end; ++a) {
       x[a] /= L[a * m + a];
       for (integer i = a + 1; i < end; ++i) x[i] -= x[a] * L[a * m + i];
     }
-    if (end < j + 4) break;
+    if (end == m) break;
     const double *c0 = L + j * m, *c1 = c0 + m, *c2 = c1 + m, *c3 = c2 + m;
     const double x0 = x[j], x1 = x[j + 1], x2 = x[j + 2], x3 = x[j + 3];
     for (integer i = end; i < m; ++i) x[i] -= (x0 * c0[i] + x1 * c1[i]) + (x2 * c2[i] + x3 * c3[i]);
   }
-  for (integer j = m > whole ? whole : m - 4; j >= 0; j -= 4) {
-    const integer end = j < whole ? j + 4 : m, left = m - end;
+  for (integer j = (m - 1) / 4 * 4; j >= 0; j -= 4) {
+    const integer end = j + 4 < m ? j + 4 : m, left = m - end;
     for (integer a = j; a < end; ++a) x[a] -= dot(left, L + a * m + end, x + end);
     for (integer a = end - 1; a >= j; --a) {
       for (integer i = a + 1; i < end; ++i) x[a] -= x[i] * L[a * m + i];
