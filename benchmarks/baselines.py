@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.contenders import CONTENDERS
-from stationkeep.comparison.metrics import GameValue, RunMetrics, distribution, run_metrics
-from stationkeep.comparison.mpc import ModelPredictive, PredictionSettings
-from stationkeep.comparison.runs import online_record
+from stationkeep.comparison.merit import GameValue, RunMetrics, distribution, run_metrics
+from stationkeep.comparison.policies import CONTENDERS
+from stationkeep.comparison.policies.mpc import ModelPredictive, PredictionSettings
+from stationkeep.comparison.records import online_record
 from stationkeep.online import Policy, draw_samples
-from stationkeep.online.record import write_text
+from stationkeep.online.records import write_text
 
 Make = Callable[[Scenario], Policy]
 HORIZONS = (2.0, 3.0, 4.0)

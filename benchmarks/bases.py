@@ -30,11 +30,12 @@ from pathlib import Path
 import numpy as np
 from regret import SEED
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.ideal import Fit, fit, ideal_record
-from stationkeep.comparison.lesson import lesson
-from stationkeep.comparison.metrics import GameValue
+from stationkeep.comparison.evidence.lesson import lesson
+from stationkeep.comparison.evidence.regret import Case, Summary, finished, game_cost
+from stationkeep.comparison.merit import GameValue
+from stationkeep.comparison.optima import fit, ideal_record
+from stationkeep.comparison.optima.ideal import Fit
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.comparison.regret import Case, Summary, finished, game_cost
 from stationkeep.offline import ErrorSize, OfflineSolver, Pairs
 from stationkeep.online import Controller, History, draw_samples, run, save
 from stationkeep.symbolic import RunError

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.kept import Keep, key_of
-from stationkeep.comparison.metrics import GameValue, dissipation_margin, run_metrics
-from stationkeep.comparison.pool import Work
-from stationkeep.comparison.runs import contender_record, provenance
+from stationkeep.comparison.evidence.kept import Keep, key_of
+from stationkeep.comparison.merit import GameValue, dissipation_margin, run_metrics
+from stationkeep.comparison.parallel import Work
+from stationkeep.comparison.records import contender_record, provenance
 from stationkeep.symbolic import RunError
 
 Row = dict[str, Any]

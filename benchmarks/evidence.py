@@ -14,7 +14,7 @@ import numpy as np
 from casadi import SX
 from stationkeep.comparison import Scenario
 from stationkeep.online import Learner, LearnerSettings, draw_samples
-from stationkeep.online.bellman import BellmanTerms, bellman_error
+from stationkeep.online.rows import BellmanTerms, bellman_error
 from stationkeep.symbolic import (
     Basis,
     Model,
@@ -24,8 +24,7 @@ from stationkeep.symbolic import (
     closed_form_problem,
     quadratic,
 )
-from stationkeep.symbolic.dynamics import earth_frame
-from stationkeep.symbolic.kinematics import jacobian, jacobian_inverse
+from stationkeep.symbolic.underwater import earth_frame, jacobian, jacobian_inverse
 
 RNG = np.random.default_rng(0)
 

@@ -29,7 +29,7 @@ from stationkeep.offline import (
     linear_policy,
 )
 from stationkeep.symbolic import Problem, closed_form_problem
-from stationkeep.symbolic.vehicle import Array
+from stationkeep.symbolic.arrays import Array
 
 FAR_STATE = np.array([2, -1, 1, 0.3, -0.2, 1, 0, 0, 0, 0, 0, 0], dtype=float)
 

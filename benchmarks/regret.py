@@ -30,10 +30,9 @@ from pathlib import Path
 import numpy as np
 from starts import print_starts, print_zero
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.kept import Keep
-from stationkeep.comparison.lesson import lesson
-from stationkeep.comparison.pool import default_workers
-from stationkeep.comparison.regret import (
+from stationkeep.comparison.evidence.kept import Keep
+from stationkeep.comparison.evidence.lesson import lesson
+from stationkeep.comparison.evidence.regret import (
     MOONSHOT,
     REQUIRED,
     Case,
@@ -42,6 +41,7 @@ from stationkeep.comparison.regret import (
     regrets,
     target,
 )
+from stationkeep.comparison.parallel import default_workers
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import StationkeepError
 

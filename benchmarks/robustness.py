@@ -32,8 +32,8 @@ from robustness_runs import (
     start_runs,
 )
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.pool import default_workers
-from stationkeep.online.closed_loop import STATE_NAMES
+from stationkeep.comparison.parallel import default_workers
+from stationkeep.symbolic.underwater import STATE_NAMES
 
 Table = Callable[[list[Row]], None]
 

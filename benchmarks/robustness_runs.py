@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from closed_loops import Run
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.metrics import GameValue
+from stationkeep.comparison.merit import GameValue
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import Vehicle
 
@@ -132,7 +132,7 @@ def current_runs(_: Scenario, __: argparse.Namespace) -> tuple[str, list[Run]]:
 
 def weaker(name: str, share: float, folder: Path) -> str:
     """Write a shipped vehicle with that share of its thruster limits; return the file's path."""
-    shipped = resources.files("stationkeep.symbolic").joinpath("vehicles", f"{name}.toml")
+    shipped = resources.files("stationkeep.symbolic.underwater").joinpath("vehicles", f"{name}.toml")
     text = shipped.read_text("utf-8")
     thrusters = Vehicle.load(name).thrusters
     assert thrusters is not None

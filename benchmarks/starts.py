@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.excitation import PLAIN, excitation_run
-from stationkeep.comparison.kept import Keep
-from stationkeep.comparison.lesson import Lesson, lesson
-from stationkeep.comparison.regret import Case, Optimum, Row, Summary, regrets
-from stationkeep.comparison.starts import (
+from stationkeep.comparison.evidence.kept import Keep
+from stationkeep.comparison.evidence.lesson import Lesson, lesson
+from stationkeep.comparison.evidence.regret import Case, Optimum, Row, Summary, regrets
+from stationkeep.comparison.evidence.starts import (
     WATCHED,
     WITHIN,
     half_added_mass,
@@ -22,9 +21,10 @@ from stationkeep.comparison.starts import (
     remembered_regret,
     time_within,
 )
+from stationkeep.comparison.study.excitation import PLAIN, excitation_run
 from stationkeep.online import draw_samples, run
 from stationkeep.symbolic import Basis, Problem, ValueFunctions, quadratic
-from stationkeep.symbolic.vehicle import Array
+from stationkeep.symbolic.arrays import Array
 
 Keeper = Callable[[str], Keep]
 TIMES = (0.0, 1.0, 5.0, 20.0, 60.0)  # s

@@ -23,14 +23,14 @@ from collections.abc import Callable
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.contenders import CONTENDERS
-from stationkeep.comparison.metrics import GameValue, run_metrics
-from stationkeep.comparison.mpc import ModelPredictive, PredictionSettings
-from stationkeep.comparison.runs import online_record
+from stationkeep.comparison.merit import GameValue, run_metrics
+from stationkeep.comparison.policies import CONTENDERS
+from stationkeep.comparison.policies.mpc import ModelPredictive, PredictionSettings
+from stationkeep.comparison.records import online_record
 from stationkeep.online import Controller, Learner, Policy, draw_samples, run
-from stationkeep.online.critic import row_weights
+from stationkeep.online.laws import row_weights
 from stationkeep.symbolic import Kernel, Model, StationKeeping, ValueFunctions
-from stationkeep.symbolic.vehicle import Array
+from stationkeep.symbolic.arrays import Array
 
 FIXED = ("learner.error=bellman", "learner.safeguard=false")
 PRINTED = ("learner.normalizer=paper", "learner.leash=0")

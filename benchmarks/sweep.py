@@ -35,10 +35,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.pool import Event
-from stationkeep.comparison.sweep import Setup, Sweep
-from stationkeep.comparison.sweep_plan import Plan, Run
-from stationkeep.comparison.sweep_run import FIGURES, TIMES, Bench, Finished, lost_row
+from stationkeep.comparison.parallel import Event
+from stationkeep.comparison.sweep import Bench, Finished, Plan, Run, Setup, Sweep
+from stationkeep.comparison.sweep.sweep_run import FIGURES, TIMES, lost_row
 
 COMMAND = [sys.executable, "-m", "stationkeep.cli.main", "sweep", "--quiet", "--json"]
 SETTINGS = ["--scales", "0.35", "--policies", "learned,linear"]

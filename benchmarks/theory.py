@@ -13,22 +13,19 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from stationkeep.comparison import Scenario, check
-from stationkeep.comparison.analysis import optimal_pairs
-from stationkeep.comparison.conditions import Condition
-from stationkeep.comparison.contenders import contender
-from stationkeep.comparison.exact_basis import exact_bound
-from stationkeep.comparison.game_run import game_run
-from stationkeep.comparison.ideal import HELD_OUT, Bounds, Ideal, fit
-from stationkeep.comparison.metrics import GameValue
-from stationkeep.comparison.run_conditions import run_conditions
-from stationkeep.comparison.runs import contender_record
-from stationkeep.comparison.theory import theory
-from stationkeep.comparison.uub import Gains, Knowledge, constants, distance, lyapunov, measure
+from stationkeep.comparison import Condition, Scenario, check
+from stationkeep.comparison.merit import GameValue
+from stationkeep.comparison.optima import HELD_OUT, Bounds, Ideal, fit
+from stationkeep.comparison.policies import contender
+from stationkeep.comparison.records import contender_record
+from stationkeep.comparison.study.analysis import optimal_pairs
+from stationkeep.comparison.study.game_run import game_run
+from stationkeep.comparison.theory import run_conditions, theory
+from stationkeep.comparison.theory.exact_basis import exact_bound
+from stationkeep.comparison.theory.uub import Gains, Knowledge, constants, distance, lyapunov, measure
 from stationkeep.offline import Pairs
-from stationkeep.online import Learner, LearnerSettings, draw_samples
-from stationkeep.online.bellman import BellmanTerms, bellman_error
-from stationkeep.online.samples import rank_margin
+from stationkeep.online import Learner, LearnerSettings, draw_samples, rank_margin
+from stationkeep.online.rows import BellmanTerms, bellman_error
 from stationkeep.symbolic import Basis, ValueFunctions, closed_form_problem, quadratic
 
 POLICIES = ("learned", "quadratic", "gradient")

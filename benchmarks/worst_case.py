@@ -29,10 +29,10 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.pool import Work, run_tasks
-from stationkeep.comparison.worst_cases import StateWorstCases, WorstCases
+from stationkeep.comparison.evidence.worst_cases import StateWorstCases, WorstCases
+from stationkeep.comparison.parallel import Work, run_tasks
 from stationkeep.online import draw_samples, run
-from stationkeep.online.record import write_text
+from stationkeep.online.records import write_text
 
 SEED = 20
 FROZEN = ("linear", "lqr", "settled", "remembered", "schedule")

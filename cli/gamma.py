@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from ..comparison.gamma_figure import draw_gamma_curves
+from ..comparison.report import draw_gamma_curves
 from ..offline import GammaCurve, GammaCurveSolver
 from ..symbolic import InputError, Problem
 from .output import print_table, progress

@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from ..comparison import Scenario
-from ..comparison.ideal import (
+from ..comparison.optima import (
     HELD_OUT,
     SIZES,
     TRAINING,
+    Optima,
     certified_pairs,
     envelope_states,
     fit,
     ideal_record,
     require_numbers,
 )
-from ..comparison.optima import Optima
 from ..offline import Pairs
 from ..online import save
 from ..symbolic import InputError

@@ -66,10 +66,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from ..symbolic.errors import InputError, StationkeepError
+    from ..symbolic import InputError, StationkeepError
 
     try:
-        module = importlib.import_module(f".{options.command}", __package__)
+        module = importlib.import_module(f".commands.{options.command}", __package__)
         return int(module.run(options))
     except InputError as error:
         print(f"stationkeep: {error}", file=sys.stderr)

@@ -20,7 +20,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ..comparison import Scenario
-from ..online.record import write_text, written_whole
+from ..online.records import write_text, written_whole
 from ..symbolic import InputError
 from . import interrupt
 

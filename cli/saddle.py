@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..comparison.optima import record_path
-from ..comparison.runs import trajectory_of
+from ..comparison.records import trajectory_of
 from ..offline import BestResponse, ControlPolicy, WorstCase, WorstCaseSolver, linear_policy
 from ..online import load
 from ..symbolic import Problem, RunError

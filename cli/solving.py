@@ -7,7 +7,7 @@ import time
 from datetime import timedelta
 
 from ..comparison.optima import Optima
-from ..comparison.pool import default_workers
+from ..comparison.parallel import default_workers
 from ..symbolic import InputError
 from .output import Tell, progress
 

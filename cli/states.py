@@ -10,7 +10,7 @@ import numpy as np
 
 from ..comparison import Scenario
 from ..symbolic import InputError, require_state
-from ..symbolic.vehicle import Array
+from ..symbolic.arrays import Array
 
 
 def initial_states(options: argparse.Namespace, scenario: Scenario) -> list[Array]:

@@ -1,19 +1,32 @@
 """Offline optimum: collocation, IPOPT, and the checks that don't trust its status."""
 
-from .best_response import BestResponse, SaddleGap
 from .certificate import Certificate
 from .direct import DirectSolution, DirectSolver
-from .gamma_curve import GammaCurve, GammaCurveSolver, GammaPoint, value_against_gamma
 from .ideal_weights import ErrorSize, IdealWeights, Pairs, error_sizes, fit_weights
-from .l2_gain import GainMeter, MeasuredGain
-from .plant import Plant
-from .policy import ControlPolicy, learned_policy, linear_policy
-from .saddle import SaddleSolution, SaddleSolver
-from .schedule import ScheduledWorstCase, WeightSchedule
+from .path import Plant, Trajectory
+from .responses import (
+    BestResponse,
+    ControlPolicy,
+    GainMeter,
+    MeasuredGain,
+    SaddleGap,
+    ScheduledWorstCase,
+    WeightSchedule,
+    WorstCase,
+    WorstCaseSolver,
+    learned_policy,
+    linear_policy,
+)
+from .saddle import (
+    GammaCurve,
+    GammaCurveSolver,
+    GammaPoint,
+    SaddleSolution,
+    SaddleSolver,
+    value_against_gamma,
+)
 from .settings import OfflineSettings
 from .solve import OfflineSolution, OfflineSolver, horizon_of, solve
-from .trajectory import Trajectory
-from .worst_case import WorstCase, WorstCaseSolver
 
 __all__ = [
     "BestResponse",

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..symbolic import Basis, InputError
-from ..symbolic.batch import BatchKernel
-from ..symbolic.kernel import dense_function
-from ..symbolic.vehicle import Array
+from ..symbolic.arrays import Array
+from ..symbolic.compiled import BatchKernel, dense_function
 
 RIDGE = 1e-10
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
-from ..symbolic.settings import Settings
+from ..symbolic.toml import Settings
 
 Method = Literal["newton", "ipopt"]
 

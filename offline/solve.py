@@ -9,15 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from ..symbolic import Problem, RunError
-from ..symbolic.vehicle import Array
+from ..symbolic.arrays import Array
 from .certificate import Certificate
-from .direct import DirectSolution, DirectSolver
-from .extremals import find_extremals
-from .mesh import extended, halved
-from .refinement import Refined, refine
+from .direct import DirectSolution, DirectSolver, Refined, find_extremals, refine
+from .path import Trajectory, extended, halved
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings
-from .trajectory import Trajectory
 
 
 @dataclass(frozen=True)

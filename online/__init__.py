@@ -1,21 +1,20 @@
 """Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
 
-from .allocation import Allocation, Allocator
-from .closed_loop import History, Policy, run
-from .controller import Controller
-from .disturbance import build_disturbance
-from .learner import Learner
-from .learner_step import LearnerStep
-from .monitor import Look, Monitor
-from .observer import DisturbanceObserver
-from .record import load, load_weights, save, to_dataset
-from .samples import draw_samples, rank_margin
-from .settings import (
+from .learning import Learner, LearnerSettings, LearnerStep, Look, Monitor, SampleSettings
+from .records import load, load_weights, save, to_dataset
+from .rows import draw_samples, rank_margin
+from .vehicle import (
+    Allocation,
+    Allocator,
+    Controller,
+    DisturbanceObserver,
     DisturbanceSettings,
-    LearnerSettings,
+    History,
     NoiseSettings,
-    SampleSettings,
+    Policy,
     SimulationSettings,
+    build_disturbance,
+    run,
 )
 
 __all__ = [

@@ -1,16 +1,29 @@
 """Symbolic models: vehicles, earth-frame dynamics, the game, bases, and their compiled functions."""
 
-from .basis import Basis, drag, drag_cubic, find_function, quadratic
+from .compiled import Export, Kernel
 from .errors import GammaTooSmallError, InputError, RunError, StationkeepError
-from .game import Game
-from .kernel import Export, Kernel
-from .model import Model, require_pitch, require_state
-from .prediction import Path, Prediction, growing_steps
-from .problem import InverseDynamics, Problem, closed_form_problem
-from .riccati import game_riccati, gamma_hamiltonian, gamma_star
-from .station import StationKeeping
-from .value import PointTerms, ValueFunctions
-from .vehicle import Thrusters, Vehicle
+from .game import (
+    Game,
+    InverseDynamics,
+    Problem,
+    closed_form_problem,
+    game_riccati,
+    gamma_hamiltonian,
+    gamma_star,
+)
+from .underwater import Model, StationKeeping, Thrusters, Vehicle, require_pitch, require_state
+from .value import (
+    Basis,
+    Path,
+    PointTerms,
+    Prediction,
+    ValueFunctions,
+    drag,
+    drag_cubic,
+    find_function,
+    growing_steps,
+    quadratic,
+)
 
 __all__ = [
     "Basis",

@@ -10,8 +10,8 @@ import numpy as np
 from casadi import MX, SX
 from scipy.integrate import DOP853, solve_ivp
 
+from .arrays import Array
 from .errors import RunError
-from .vehicle import Array
 
 E = TypeVar("E", SX, MX)
 

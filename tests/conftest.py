@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stationkeep.symbolic import Game, Model, Problem, Vehicle, kernel
+from stationkeep.symbolic import Game, Model, Problem, Vehicle
+from stationkeep.symbolic.compiled import kernel
 
 # words of Python and of libraries that mean nothing to somebody who wrote a TOML file
 JARGON = (

@@ -25,7 +25,7 @@ SHIPPED = ("bluerov2-heavy", "bluerov2-heavy-buoyant", "bluerov2-heavy-2024", "r
 
 def read_parameters(name: str) -> dict[str, Any]:
     """Return the raw parameters of a shipped vehicle."""
-    file = resources.files("stationkeep.symbolic").joinpath("vehicles", f"{name}.toml")
+    file = resources.files("stationkeep.symbolic.underwater").joinpath("vehicles", f"{name}.toml")
     return tomllib.loads(file.read_text(encoding="utf-8"))
 
 

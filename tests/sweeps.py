@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from stationkeep.comparison.sweep_run import TIMES
+from stationkeep.comparison.sweep.sweep_run import TIMES
 
 from .commands import QUICK, script, sets
 from .processes import Group

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from stationkeep.comparison import Scenario
 from stationkeep.symbolic import Vehicle
-from stationkeep.symbolic.settings import shipped_names
+from stationkeep.symbolic.toml import shipped_names
 
 ROOT = Path(__file__).resolve().parents[1]
 MAY_IMPORT = {
@@ -28,7 +28,7 @@ MAY_IMPORT = {
 SOURCES = [path for folder in MAY_IMPORT for path in sorted((ROOT / folder).rglob("*.py"))]
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 # the file that may import what only an extra installs
-ADAPTERS = {"control": "comparison/control_adapter.py", "gymnasium": "comparison/gym_adapter.py"}
+ADAPTERS = {"control": "comparison/adapters/control.py", "gymnasium": "comparison/adapters/gym.py"}
 
 
 def name_of(path: Path) -> str:
@@ -120,8 +120,9 @@ def test_what_only_an_extra_installs_is_imported_by_its_adapter_alone() -> None:
         packages = {module.split(".")[0] for module in imported(path)}
         for package in packages & set(ADAPTERS):
             assert name_of(path) == ADAPTERS[package]
-        names = {module.rpartition(".")[2] for module in imported(path)}
-        assert not names & {"control_adapter", "gym_adapter"}, f"{name_of(path)} imports an adapter"
+        adapters = {place.removesuffix(".py").replace("/", ".") for place in ADAPTERS.values()}
+        names = {module.removeprefix("stationkeep.") for module in imported(path)}
+        assert not names & adapters, f"{name_of(path)} imports an adapter"
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=name_of)
@@ -167,7 +168,7 @@ def test_exported_names_exist_and_the_types_are_shipped(folder: str) -> None:
 
 
 def test_shipped_vehicles_load() -> None:
-    names = shipped_names("stationkeep.symbolic", "vehicles")
+    names = shipped_names("stationkeep.symbolic.underwater", "vehicles")
     assert {"bluerov2-heavy", "bluerov2-heavy-buoyant", "rexrov"} <= set(names)
     for name in names:
         assert Vehicle.load(name).source
@@ -183,14 +184,23 @@ def test_shipped_scenarios_load() -> None:
 def test_package_data_covers_what_is_read_at_run_time() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     data = project["tool"]["setuptools"]["package-data"]
+    packages = {path.parent for path in SOURCES}
     for folder in MAY_IMPORT:
-        patterns = data[f"stationkeep.{folder}"]
-        others = [
-            p for p in (ROOT / folder).rglob("*") if p.is_file() and p.suffix not in (".py", ".pyc")
-        ]
-        for path in others:
-            relative = path.relative_to(ROOT / folder)
+        for path in (ROOT / folder).rglob("*"):
+            if path.is_dir() or path.suffix in (".py", ".pyc"):
+                continue
+            package = next(parent for parent in path.parents if parent in packages)
+            name = ".".join(["stationkeep", *package.relative_to(ROOT).parts])
+            relative = path.relative_to(package)
+            patterns = data.get(name, [])
             assert any(relative.match(pattern) for pattern in patterns), name_of(path)
+
+
+def test_every_package_is_shipped() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    shipped = set(project["tool"]["setuptools"]["packages"])
+    there = {".".join(["stationkeep", *path.parent.relative_to(ROOT).parts]) for path in SOURCES}
+    assert shipped == there
 
 
 def written_files() -> list[Path]:

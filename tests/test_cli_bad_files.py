@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from stationkeep.comparison import runs
+from stationkeep.comparison.records import runs
 
 from .commands import QUICK, call, files_in, sets
 from .games import quick_scenario

@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from stationkeep.comparison import runs
+from stationkeep.comparison.records import runs
 from stationkeep.symbolic import InputError
 
 from .commands import LOOSE, QUICK, ROUGH, call, files_in, run, sets

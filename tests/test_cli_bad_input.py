@@ -178,6 +178,6 @@ def test_the_sentence_of_the_script(tmp_path: Path) -> None:
 
 def shipped_text() -> str:
     """Return the text of the shipped scenario."""
-    folder = Path(__file__).resolve().parents[1] / "comparison" / "scenarios"
+    folder = Path(__file__).resolve().parents[1] / "comparison" / "scenario" / "scenarios"
     assert "bluerov2-heavy" in Scenario.shipped()
     return (folder / "bluerov2-heavy.toml").read_text(encoding="utf-8")

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stationkeep.comparison import Scenario, clairvoyant
+from stationkeep.comparison import Scenario
+from stationkeep.comparison.records import clairvoyant
 from stationkeep.offline import OfflineSolution, OfflineSolver, Trajectory
 from stationkeep.online import load
 from stationkeep.symbolic import RunError

@@ -12,7 +12,7 @@ from pathlib import Path
 import casadi
 import pytest
 from stationkeep.online import Learner, Monitor, load
-from stationkeep.online.plant import HeldPlant
+from stationkeep.online.vehicle import HeldPlant
 
 from .commands import COARSE, QUICK, Answer, call, files_in, script, sets
 

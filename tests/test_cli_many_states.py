@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from stationkeep.comparison.lock import NAME, locked
+from stationkeep.comparison.parallel import locked
+from stationkeep.comparison.parallel.lock import NAME
 from stationkeep.online import load
 
 from .commands import LOOSE, QUICK, call, files_in, script, sets

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from stationkeep.comparison.matlab import matlab_name
-from stationkeep.comparison.runs import online_record
+from stationkeep.comparison.adapters.matlab import matlab_name
+from stationkeep.comparison.records import online_record
 from stationkeep.online import load, save
 
 from .commands import QUICK, call, run, sets

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.metrics import GameValue, run_metrics
-from stationkeep.comparison.runs import contender_record
-from stationkeep.comparison.vary import varied
+from stationkeep.comparison.merit import GameValue, run_metrics
+from stationkeep.comparison.records import contender_record
+from stationkeep.comparison.sweep.vary import varied
 from stationkeep.online import draw_samples, load
 
 from .commands import QUICK, call, files_in, sets

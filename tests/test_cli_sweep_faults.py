@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stationkeep.comparison.lock import locked
+from stationkeep.comparison.parallel import locked
 from stationkeep.online import load
 
 from .commands import call, files_in, sets
@@ -144,7 +144,8 @@ def test_through_a_cluster_with_a_worker_lost_then_the_scheduler(
         words = ("--states", "30", "--cluster", dask.address)
         with monkeypatch.context() as patch:
             patch.setattr(
-                "stationkeep.comparison.cluster.versions", lambda: {"stationkeep_version": "99"}
+                "stationkeep.comparison.parallel.cluster.versions",
+                lambda: {"stationkeep_version": "99"},
             )
             answer = call(capsys, *QUIET[:3], *SETTINGS, *words)
         assert answer.code == 2
@@ -172,7 +173,7 @@ def test_through_a_cluster_with_a_worker_lost_then_the_scheduler(
 
 @pytest.mark.slow
 def test_nobody_at_the_address(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stationkeep.comparison.cluster.CONNECT", "1s")
+    monkeypatch.setattr("stationkeep.comparison.parallel.cluster.CONNECT", "1s")
     answer = call(capsys, "sweep", "--quiet", "--cluster", "tcp://127.0.0.1:9", *sets(*SETTINGS[3::2]))
     assert answer.code == 2
     assert "no dask scheduler answers at 'tcp://127.0.0.1:9'" in answer.sentence()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stationkeep.comparison.adversary import FrozenPolicy, PlayedForce, WatchedController, play
+from stationkeep.comparison.evidence.adversary import FrozenPolicy, PlayedForce, WatchedController, play
 from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.offline import ControlPolicy, WorstCaseSolver, linear_policy
 

@@ -13,7 +13,8 @@ import pytest
 import xarray as xr
 from matplotlib import animation as films
 from PIL import Image
-from stationkeep.comparison.animation import FRAMES_PER_SECOND, HULL, animate, frames, outline
+from stationkeep.comparison.report import animate
+from stationkeep.comparison.report.animation import FRAMES_PER_SECOND, HULL, frames, outline
 from stationkeep.symbolic import InputError
 
 

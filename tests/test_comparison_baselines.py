@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
-from stationkeep.comparison.mpc import ModelPredictive, PredictionSettings
-from stationkeep.comparison.pid import CascadedPID, CascadeSettings
 from stationkeep.comparison.policies import LQR, Baseline, LinearPolicy
+from stationkeep.comparison.policies.mpc import ModelPredictive, PredictionSettings
+from stationkeep.comparison.policies.pid import CascadedPID, CascadeSettings
 from stationkeep.offline import DirectSolver
 from stationkeep.online import run
 from stationkeep.symbolic import InputError, RunError

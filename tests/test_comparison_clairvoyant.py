@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from stationkeep.comparison import clairvoyant as module
-from stationkeep.comparison.clairvoyant import clairvoyant_record, known_stage
-from stationkeep.comparison.recorded import load_run, run_again
-from stationkeep.comparison.runs import contender_record
-from stationkeep.comparison.scenario import Scenario
+from stationkeep.comparison import Scenario
+from stationkeep.comparison.records import clairvoyant as module
+from stationkeep.comparison.records import clairvoyant_record, contender_record
+from stationkeep.comparison.records.clairvoyant import known_stage
+from stationkeep.comparison.records.recorded import load_run, run_again
 from stationkeep.online import build_disturbance
-from stationkeep.online.plant import HeldPlant
+from stationkeep.online.vehicle import HeldPlant
 from stationkeep.symbolic import RunError, Vehicle
 
 from .games import quick_scenario

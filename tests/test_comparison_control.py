@@ -14,12 +14,11 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.control_adapter import to_control
-from stationkeep.comparison.pid import CascadedPID
+from stationkeep.comparison.adapters.control import to_control
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.online import Controller, save
-from stationkeep.online.disturbance import build_disturbance
-from stationkeep.online.plant import HeldPlant, PlantState
+from stationkeep.comparison.policies.pid import CascadedPID
+from stationkeep.online import Controller, build_disturbance, save
+from stationkeep.online.vehicle import HeldPlant, PlantState
 from stationkeep.symbolic import InputError
 
 from .commands import QUICK

@@ -17,12 +17,11 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.metrics import GameValue, dissipation_margin
+from stationkeep.comparison.merit import GameValue, dissipation_margin
 from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.offline import DirectSolver
-from stationkeep.online import draw_samples, run, to_dataset
-from stationkeep.online.disturbance import build_disturbance
-from stationkeep.online.plant import HeldPlant, PlantState
+from stationkeep.online import build_disturbance, draw_samples, run, to_dataset
+from stationkeep.online.vehicle import HeldPlant, PlantState
 from stationkeep.symbolic import Problem
 
 from .games import HALF_WIDTHS, Array, linear_quadratic, quick_scenario, two_state

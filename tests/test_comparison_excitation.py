@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from stationkeep.comparison import excitation
-from stationkeep.comparison.excitation import PLAIN, ExcitationRun, excitation_runs, fixed_point
+from stationkeep.comparison.study import ExcitationRun, excitation
+from stationkeep.comparison.study.excitation import PLAIN, excitation_runs, fixed_point
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import Basis, Problem
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.gym_adapter import StationKeepingEnv
+from stationkeep.comparison.adapters.gym import StationKeepingEnv
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.comparison.runs import online_record
-from stationkeep.online.closed_loop import STATE_NAMES
+from stationkeep.comparison.records import online_record
 from stationkeep.symbolic import InputError
+from stationkeep.symbolic.underwater import STATE_NAMES
 
 from .commands import QUICK
 from .games import Array, quick_scenario
@@ -150,7 +150,7 @@ def test_without_gymnasium(
     monkeypatch: pytest.MonkeyPatch, one_sentence: Callable[[BaseException], str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "gymnasium", None)
-    monkeypatch.delitem(sys.modules, "stationkeep.comparison.gym_adapter")
+    monkeypatch.delitem(sys.modules, "stationkeep.comparison.adapters.gym")
     with pytest.raises(InputError) as caught:
-        importlib.import_module("stationkeep.comparison.gym_adapter")
+        importlib.import_module("stationkeep.comparison.adapters.gym")
     assert "stationkeep[gym]" in one_sentence(caught.value)

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stationkeep.comparison import Condition, Scenario, check
-from stationkeep.comparison.conditions import drift_bound
-from stationkeep.comparison.ideal import (
+from stationkeep.comparison.optima import (
     HELD_OUT,
     TRAINING,
     Bounds,
+    Optima,
     certified_pairs,
     envelope_states,
     fit,
     ideal_record,
     load_ideal,
 )
-from stationkeep.comparison.optima import Optima
+from stationkeep.comparison.theory.conditions import drift_bound
 from stationkeep.offline import Pairs
 from stationkeep.online import Learner, load, load_weights, save
 from stationkeep.symbolic import InputError, RunError

@@ -10,14 +10,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from stationkeep.comparison.lock import NAME, locked
+from stationkeep.comparison.parallel import locked
+from stationkeep.comparison.parallel.lock import NAME
 from stationkeep.symbolic import InputError
 
 Check = Callable[[BaseException], str]
 HOLDER = """
 import sys, time
 from pathlib import Path
-from stationkeep.comparison.lock import locked
+from stationkeep.comparison.parallel import locked
 with locked(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)

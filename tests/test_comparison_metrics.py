@@ -10,17 +10,16 @@ import pytest
 import xarray as xr
 from casadi import collocation_points
 from scipy.integrate import quad, trapezoid
-from stationkeep.comparison.metrics import (
+from stationkeep.comparison.merit import (
     GameValue,
     cost_to_date,
     dissipation_margin,
     distribution,
-    energy,
-    peak_thrust,
     run_metrics,
 )
+from stationkeep.comparison.merit.metrics import energy, peak_thrust
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.comparison.runs import online_record, optimal_record
+from stationkeep.comparison.records import online_record, optimal_record
 from stationkeep.offline import OfflineSolver, Trajectory
 from stationkeep.symbolic import Vehicle
 

@@ -13,10 +13,10 @@ import pytest
 import xarray as xr
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.optima import CERTIFICATE, Optima, record_path
-from stationkeep.comparison.runs import optimum_or_failure, optimum_provenance, trajectory_of
+from stationkeep.comparison.records import optimum_or_failure, optimum_provenance, trajectory_of
 from stationkeep.offline import OfflineSolution, OfflineSolver, Trajectory
 from stationkeep.online import load
-from stationkeep.online.record import read_parts, remove_temporaries
+from stationkeep.online.records import read_parts, remove_temporaries
 from stationkeep.symbolic import InputError, RunError
 
 from .commands import LOOSE, QUICK

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stationkeep.comparison.plan import LARGEST, NEAR, plan
+from stationkeep.comparison.optima.plan import LARGEST, NEAR, plan
 
 from .games import HALF_WIDTHS, Array
 

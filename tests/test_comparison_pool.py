@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from stationkeep.comparison.pool import Event, default_workers, run_tasks
+from stationkeep.comparison.parallel import Event, default_workers, run_tasks
 from stationkeep.symbolic import InputError, RunError
 
 # a task is what to do; functions of a script's own module reach the workers
@@ -17,7 +17,7 @@ SCRIPT = """
 import json, multiprocessing, os, signal, sys, time
 from contextlib import closing
 from pathlib import Path
-from stationkeep.comparison.pool import run_tasks
+from stationkeep.comparison.parallel import run_tasks
 from stationkeep.symbolic import InputError, RunError
 
 

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.comparison.runs import OFFLINE_KEY, online_record, optimal_record, provenance
+from stationkeep.comparison.records import OFFLINE_KEY, online_record, optimal_record, provenance
 from stationkeep.offline import OfflineSolver
 from stationkeep.online import load
 
@@ -76,7 +76,13 @@ def test_another_policy_makes_it_again(kept: Path) -> None:
 
 
 def test_an_edited_vehicle_has_another_key(tmp_path: Path) -> None:
-    source = Path(__file__).resolve().parents[1] / "symbolic" / "vehicles" / "bluerov2-heavy.toml"
+    source = (
+        Path(__file__).resolve().parents[1]
+        / "symbolic"
+        / "underwater"
+        / "vehicles"
+        / "bluerov2-heavy.toml"
+    )
     vehicle = tmp_path / "mine.toml"
     shutil.copy(source, vehicle)
     settings = [*QUICK, f"vehicle='{vehicle}'"]

@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.kept import Keep, key_of
-from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.comparison.pool import Work
-from stationkeep.comparison.regret import (
+from stationkeep.comparison.evidence.kept import Keep, key_of
+from stationkeep.comparison.evidence.regret import (
     MOONSHOT,
     REQUIRED,
     Case,
@@ -22,6 +20,8 @@ from stationkeep.comparison.regret import (
     regrets,
     target,
 )
+from stationkeep.comparison.parallel import Work
+from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import InputError
 

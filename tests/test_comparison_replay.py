@@ -13,11 +13,18 @@ import numpy as np
 import pytest
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.contenders import CONTENDERS
 from stationkeep.comparison.optima import Optima, record_path
-from stationkeep.comparison.recorded import load_run, recorded_scenario
-from stationkeep.comparison.replay import BIT_EQUAL, DIFFERENT, WITHIN, compared, gap, replay
-from stationkeep.comparison.runs import contender_record, online_record, optimal_record
+from stationkeep.comparison.policies import CONTENDERS
+from stationkeep.comparison.records import (
+    BIT_EQUAL,
+    DIFFERENT,
+    contender_record,
+    online_record,
+    optimal_record,
+    replay,
+)
+from stationkeep.comparison.records.recorded import load_run, recorded_scenario
+from stationkeep.comparison.records.replay import WITHIN, compared, gap
 from stationkeep.offline import OfflineSolver
 from stationkeep.online import load, save
 from stationkeep.symbolic import InputError
@@ -25,7 +32,7 @@ from stationkeep.symbolic import InputError
 from .commands import QUICK, ROUGH
 from .games import quick_scenario
 
-VEHICLES = Path(__file__).resolve().parents[1] / "symbolic" / "vehicles"
+VEHICLES = Path(__file__).resolve().parents[1] / "symbolic" / "underwater" / "vehicles"
 SHORT = "simulation.duration=0.5"
 BASIS = """
 import casadi

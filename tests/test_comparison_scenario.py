@@ -7,15 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.runs import online_record
+from stationkeep.comparison.records import online_record
 from stationkeep.online import run, save
 from stationkeep.symbolic import InputError, Vehicle
 
 from .commands import QUICK
 from .games import quick_scenario
 
-SHIPPED = Path(__file__).resolve().parents[1] / "comparison" / "scenarios" / "bluerov2-heavy.toml"
-VEHICLES = Path(__file__).resolve().parents[1] / "symbolic" / "vehicles"
+SHIPPED = (
+    Path(__file__).resolve().parents[1]
+    / "comparison"
+    / "scenario"
+    / "scenarios"
+    / "bluerov2-heavy.toml"
+)
+VEHICLES = Path(__file__).resolve().parents[1] / "symbolic" / "underwater" / "vehicles"
 BASIS = """
 import casadi
 from stationkeep.symbolic import quadratic

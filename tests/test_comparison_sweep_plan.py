@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.sweep_plan import Plan, sampled
-from stationkeep.comparison.vary import Choices, Range, parse_vary, varied
+from stationkeep.comparison.sweep import Plan, parse_vary
+from stationkeep.comparison.sweep.sweep_plan import sampled
+from stationkeep.comparison.sweep.vary import Choices, Range, varied
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import InputError, Vehicle
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from stationkeep.comparison.metrics import distribution
-from stationkeep.comparison.sweep_summary import summary
-from stationkeep.comparison.sweep_table import BLOCK, Journal, write_csv, write_netcdf
+from stationkeep.comparison.merit import distribution
+from stationkeep.comparison.sweep import summary
+from stationkeep.comparison.sweep.sweep_table import BLOCK, Journal, write_csv, write_netcdf
 
 UNITS = {"run": "1", "policy": None, "cost": "cost", "reason": None, "failed": "1"}
 
@@ -125,7 +125,7 @@ def test_a_full_disk_is_a_sentence_and_the_older_table_stays(name: str, tmp_path
     code = (
         "import resource, sys\n"
         "from pathlib import Path\n"
-        "from stationkeep.comparison.sweep_table import write_csv, write_netcdf\n"
+        "from stationkeep.comparison.sweep.sweep_table import write_csv, write_netcdf\n"
         "from stationkeep.symbolic import InputError\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n"
         "rows = ({'run': i, 'cost': 0.1 * i} for i in range(20_000))\n"

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from stationkeep.comparison import Condition
-from stationkeep.comparison.analysis import ideal_of
-from stationkeep.comparison.ideal import Bounds, Ideal, fit, ideal_record
-from stationkeep.comparison.monitor_figure import draw_monitor
-from stationkeep.comparison.run_conditions import run_conditions
-from stationkeep.comparison.runs import online_record
-from stationkeep.comparison.style import Page
-from stationkeep.comparison.theory import Theory, require_run, theory
+from stationkeep.comparison.optima import Bounds, Ideal, fit, ideal_record
+from stationkeep.comparison.records import online_record
+from stationkeep.comparison.report import Page
+from stationkeep.comparison.report.monitor_figure import draw_monitor
+from stationkeep.comparison.study.analysis import ideal_of
+from stationkeep.comparison.theory import Theory, require_run, run_conditions, theory
 from stationkeep.offline import Pairs
 from stationkeep.online import save
 from stationkeep.symbolic import InputError

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from stationkeep.comparison.exact_basis import exact_bound
-from stationkeep.comparison.game_run import GameRun, game_run
-from stationkeep.comparison.uub import (
+from stationkeep.comparison.study.game_run import GameRun, game_run
+from stationkeep.comparison.theory.exact_basis import exact_bound
+from stationkeep.comparison.theory.uub import (
     Gains,
     Knowledge,
     Suprema,

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from casadi import DM, SX
 from scipy.integrate import solve_ivp
-from stationkeep.offline.clairvoyant import ClairvoyantSolver
-from stationkeep.offline.direct import DirectSolver
-from stationkeep.offline.mesh import growing_mesh
-from stationkeep.offline.stage import against_known
+from stationkeep.offline import DirectSolver
+from stationkeep.offline.direct import against_known
+from stationkeep.offline.path import growing_mesh
+from stationkeep.offline.responses import ClairvoyantSolver
 from stationkeep.symbolic import Problem, RunError
 
 from .games import Array

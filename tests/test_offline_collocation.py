@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from stationkeep.offline import DirectSolution, DirectSolver, Trajectory
-from stationkeep.offline.radau import RadauRule
-from stationkeep.offline.stage import single_player
-from stationkeep.offline.transcription import Transcription
+from stationkeep.offline.direct import Transcription
+from stationkeep.offline.direct.stage import single_player
+from stationkeep.offline.path import RadauRule
 from stationkeep.symbolic import Problem
 
 from .games import FAR_STATE, HALF_WIDTHS, Array, linear_quadratic, two_state

@@ -6,9 +6,8 @@ import casadi
 import numpy as np
 import pytest
 from casadi import MX
-from stationkeep.offline.derivatives import PointDerivatives
-from stationkeep.offline.stage import single_player
-from stationkeep.offline.transcription import Transcription
+from stationkeep.offline.direct import PointDerivatives, Transcription
+from stationkeep.offline.direct.stage import single_player
 from stationkeep.symbolic import Problem
 
 from .games import two_state

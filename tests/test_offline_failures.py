@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from casadi import SX
 from stationkeep.offline import DirectSolver, OfflineSettings, OfflineSolver, Plant, solve
-from stationkeep.offline.verification import reintegrate
+from stationkeep.offline.path import reintegrate
 from stationkeep.symbolic import Game, InputError, Problem, RunError
 
 from .games import FAR_STATE, Array, linear_quadratic, two_state

@@ -15,7 +15,7 @@ from stationkeep.offline import (
     SaddleSolver,
     value_against_gamma,
 )
-from stationkeep.offline.gamma_curve import default_gammas
+from stationkeep.offline.saddle.gamma_curve import default_gammas
 from stationkeep.symbolic import Game, InputError, Problem, RunError, game_riccati
 
 from .games import FAR_STATE, FAR_VALUE, HALF_WIDTHS, Array, two_state
@@ -98,7 +98,7 @@ def test_horizon_follows_the_closed_loop(
     """Close to γ* twice the horizon changes nothing, though 120 s are 2e-6 short of it."""
     start = np.array([0.7, -0.35, 0.35, 0.1, -0.07, 0.35, 0, 0, 0, 0, 0, 0])
     near = value_against_gamma(reference_problem, start, [1.02]).points[0]
-    monkeypatch.setattr("stationkeep.offline.gamma_curve.HORIZON", 20.0)
+    monkeypatch.setattr("stationkeep.offline.saddle.gamma_curve.HORIZON", 20.0)
     twice = value_against_gamma(reference_problem, start, [1.02]).points[0]
     assert near.value == pytest.approx(twice.value, rel=1e-11)
     assert near.slope == pytest.approx(twice.slope, rel=1e-9)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stationkeep.offline.gauss import GaussRule
-from stationkeep.offline.interpolation import interpolate
+from stationkeep.offline.path import GaussRule, interpolate
 
 DEGREES = range(1, 10)
 

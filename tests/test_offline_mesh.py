@@ -9,9 +9,7 @@ from casadi import SX
 from hypothesis import given
 from hypothesis import strategies as st
 from stationkeep.offline import Plant, Trajectory
-from stationkeep.offline.mesh import aligned_mesh, graded_mesh
-from stationkeep.offline.radau import RadauRule
-from stationkeep.offline.verification import sign_changes
+from stationkeep.offline.path import RadauRule, aligned_mesh, graded_mesh, sign_changes
 from stationkeep.symbolic import Game, Problem
 
 from .games import Array, two_state

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from casadi import DM, SX, Function
 from stationkeep.offline import DirectSolver
-from stationkeep.offline.neighbour import Feedback, NeighbouringOptimum, feedback_law
+from stationkeep.offline.responses.neighbour import Feedback, NeighbouringOptimum, feedback_law
 from stationkeep.symbolic import Problem
 
 from .games import FAST_STATE, HALF_WIDTHS, linear_quadratic, two_state

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from stationkeep.offline import DirectSolver
-from stationkeep.offline.grid import Grid
-from stationkeep.offline.mesh import graded_mesh
-from stationkeep.offline.newton import StructuredNewton
+from stationkeep.offline.direct import StructuredNewton
+from stationkeep.offline.path import Grid, graded_mesh
 from stationkeep.symbolic import InputError, Problem
 
 from .games import FAR_STATE, FAST_STATE, HALF_WIDTHS, linear_quadratic, two_state

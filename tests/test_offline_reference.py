@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from stationkeep.offline import DirectSolution, DirectSolver, OfflineSettings, Plant
-from stationkeep.offline.verification import reintegrate
+from stationkeep.offline.path import reintegrate
 from stationkeep.symbolic import Problem
 
 from .games import FAR_STATE, FAR_VALUE, FAST_STATE, FAST_VALUE, HALF_WIDTHS, Array, quick_scenario

@@ -10,7 +10,7 @@ import pytest
 from casadi import SX
 from scipy.integrate import solve_bvp
 from stationkeep.offline import DirectSolver, SaddleSolver
-from stationkeep.offline.extremal_field import ExtremalField
+from stationkeep.offline.saddle.extremal_field import ExtremalField
 from stationkeep.symbolic import Game, InputError, Problem, RunError
 
 from .games import FAR_STATE, FAR_VALUE, FAST_STATE, FAST_VALUE, HALF_WIDTHS, Array, two_state

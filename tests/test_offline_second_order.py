@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 from casadi import SX
-from stationkeep.offline.second_order import second_order
-from stationkeep.offline.stage import Stage, against_control
-from stationkeep.offline.trajectory import Trajectory
-from stationkeep.offline.transcription import Optimum, Transcription
+from stationkeep.offline import Trajectory
+from stationkeep.offline.direct import Optimum, Stage, Transcription, against_control, second_order
 
 from .games import two_state
 

@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from stationkeep.online import Allocator, run
-from stationkeep.online.allocation import RIDGE
-from stationkeep.online.record import to_dataset
+from stationkeep.online import Allocator, run, to_dataset
+from stationkeep.online.vehicle.allocation import RIDGE
 from stationkeep.symbolic import InputError, RunError, Vehicle
 
 from .games import Array, quick_scenario

@@ -10,7 +10,7 @@ from stationkeep.comparison import Scenario
 from stationkeep.offline import DirectSolver
 from stationkeep.online import Controller, History, run
 from stationkeep.symbolic import InputError, RunError
-from stationkeep.symbolic.prediction import BOUND
+from stationkeep.symbolic.value import BOUND
 
 from .games import Array, quick_scenario
 

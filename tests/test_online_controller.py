@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from stationkeep.comparison import Scenario
 from stationkeep.online import Controller
-from stationkeep.online.disturbance import Force
-from stationkeep.online.plant import HeldPlant, PlantState
+from stationkeep.online.vehicle import HeldPlant, PlantState
+from stationkeep.online.vehicle.disturbance import Force
 from stationkeep.symbolic import InputError
 
 from .games import QUICK, Array, quick_scenario

@@ -7,8 +7,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from stationkeep.online import Learner, LearnerSettings, draw_samples, run
-from stationkeep.online.settings import SampleSettings, SimulationSettings
+from stationkeep.online import (
+    Learner,
+    LearnerSettings,
+    SampleSettings,
+    SimulationSettings,
+    draw_samples,
+    run,
+)
 from stationkeep.symbolic import StationKeeping, ValueFunctions
 
 from .games import (

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from stationkeep.online import Learner, LearnerSettings, draw_samples
-from stationkeep.online.critic import LeastSquares, NormalEquations, gradient_step, row_weights
+from stationkeep.online.laws import LeastSquares, NormalEquations, gradient_step, row_weights
 
 from .games import TWO_STATE_WEIGHTS, Array, two_state
 

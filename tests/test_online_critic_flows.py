@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from stationkeep.online.critic import LeastSquares, NormalEquations, gradient_step, row_weights
+from stationkeep.online.laws import LeastSquares, NormalEquations, gradient_step, row_weights
 
 from .games import Array
 

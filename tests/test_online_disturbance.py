@@ -8,8 +8,8 @@ import pytest
 from casadi import SX
 from scipy.integrate import quad
 from stationkeep.online import DisturbanceSettings, build_disturbance
-from stationkeep.online.disturbance import GRAVITY, DisturbanceSource, Waves, jonswap
-from stationkeep.online.plant import HeldPlant
+from stationkeep.online.vehicle import HeldPlant
+from stationkeep.online.vehicle.disturbance import GRAVITY, DisturbanceSource, Waves, jonswap
 
 from .games import Array, quick_scenario
 

@@ -6,12 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from stationkeep.comparison.metrics import dissipation_margin
+from stationkeep.comparison.merit import dissipation_margin
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.comparison.runs import online_record, provenance
-from stationkeep.online import run
-from stationkeep.online.noise import MeasurementNoise
-from stationkeep.online.settings import NoiseSettings
+from stationkeep.comparison.records import online_record, provenance
+from stationkeep.online import NoiseSettings, run
+from stationkeep.online.vehicle import MeasurementNoise
 from stationkeep.symbolic import InputError, Model, Vehicle
 
 from .games import Array, quick_scenario

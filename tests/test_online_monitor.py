@@ -5,11 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg
-from stationkeep.online import Learner, LearnerSettings, Look, Monitor, draw_samples, run
-from stationkeep.online.closed_loop import History
-from stationkeep.online.controller import Controller, fixed_points
-from stationkeep.online.critic import NormalEquations
-from stationkeep.online.monitor import row_margin, row_rank
+from stationkeep.online import (
+    Controller,
+    History,
+    Learner,
+    LearnerSettings,
+    Look,
+    Monitor,
+    draw_samples,
+    run,
+)
+from stationkeep.online.laws import NormalEquations
+from stationkeep.online.learning.monitor import row_margin, row_rank
+from stationkeep.online.vehicle import fixed_points
 
 from .games import TWO_STATE_WEIGHTS, Array, quick_scenario, two_state
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.comparison.runs import online_record
+from stationkeep.comparison.records import online_record
 from stationkeep.online import DisturbanceObserver, run
 from stationkeep.symbolic import InputError
 

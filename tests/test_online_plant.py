@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from stationkeep.online import DisturbanceSettings, build_disturbance
-from stationkeep.online.disturbance import Disturbance
-from stationkeep.online.plant import HeldPlant, PlantState
+from stationkeep.online.vehicle import Disturbance, HeldPlant, PlantState
 from stationkeep.symbolic import RunError, StationKeeping
 
 from .games import Array, quick_scenario

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 import scipy.linalg
 from stationkeep.online import Learner, LearnerSettings, draw_samples
-from stationkeep.online.bellman import BellmanTerms
-from stationkeep.online.critic import row_weights
-from stationkeep.online.policy_iteration import (
+from stationkeep.online.laws import row_weights
+from stationkeep.online.learning.policy_iteration import (
     RowsUnder,
     bellman_rows,
     costate_rows,
     fitted,
     policy_iteration,
 )
-from stationkeep.online.rows import PathRows
+from stationkeep.online.rows import BellmanTerms, PathRows
 from stationkeep.symbolic import Basis, Problem, RunError, ValueFunctions, growing_steps, quadratic
 
 from .games import HALF_WIDTHS, Array, linear_quadratic, two_state

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 from stationkeep.comparison import Scenario
 from stationkeep.online import History, load, load_weights, run, save, to_dataset
-from stationkeep.online.record import write_text, written_whole
+from stationkeep.online.records import write_text, written_whole
 from stationkeep.symbolic import InputError
 
 from .games import QUICK, Array, quick_scenario

@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg
-from stationkeep.online import Learner, LearnerSettings, SampleSettings
-from stationkeep.online.safeguard import Safeguard
-from stationkeep.online.samples import (
-    FixedSamples,
-    ShrinkingSamples,
-    TrajectorySamples,
-    draw_samples,
-)
+from stationkeep.online import Learner, LearnerSettings, SampleSettings, draw_samples
+from stationkeep.online.learning.safeguard import Safeguard
+from stationkeep.online.rows import FixedSamples, ShrinkingSamples, TrajectorySamples
 from stationkeep.symbolic import Path
 
 from .games import TWO_STATE_WEIGHTS, Array, two_state

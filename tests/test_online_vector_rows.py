@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stationkeep.online import Controller, Learner, vector_code
-from stationkeep.online.critic import LeastSquares, NormalEquations, exact_flow
-from stationkeep.online.samples import draw_samples
-from stationkeep.online.vector_code import largest_covariance, library
-from stationkeep.online.vector_rows import VectorEquations
-from stationkeep.symbolic.compilation import find_compiler
+from stationkeep.online import Controller, Learner, draw_samples
+from stationkeep.online.laws import LeastSquares, NormalEquations, exact_flow, library, vector_code
+from stationkeep.online.laws.vector_code import largest_covariance
+from stationkeep.online.rows.vector_rows import VectorEquations
+from stationkeep.symbolic.compiled.compilation import find_compiler
 
 from .games import Array, quick_scenario, random_weights
 

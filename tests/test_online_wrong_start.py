@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.kept import Keep
-from stationkeep.comparison.lesson import lesson
-from stationkeep.comparison.regret import Case, Optimum
-from stationkeep.comparison.starts import (
+from stationkeep.comparison.evidence.kept import Keep
+from stationkeep.comparison.evidence.lesson import lesson
+from stationkeep.comparison.evidence.regret import Case, Optimum
+from stationkeep.comparison.evidence.starts import (
     Recovery,
     half_added_mass,
     rank_and_margin,

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from casadi import SX
 from scipy.integrate import solve_ivp
-from stationkeep.symbolic.batch import BatchKernel
-from stationkeep.symbolic.kernel import dense_function
+from stationkeep.symbolic.compiled import BatchKernel, dense_function
 
 
 @pytest.fixture(params=[True, False], ids=["compiled", "virtual machine"])

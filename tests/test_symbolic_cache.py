@@ -15,8 +15,8 @@ from pathlib import Path
 import casadi
 import numpy as np
 import pytest
-from stationkeep.symbolic import compilation, kernel
-from stationkeep.symbolic.compilation import compile_function, find_compiler
+from stationkeep.symbolic.compiled import compilation, kernel
+from stationkeep.symbolic.compiled.compilation import compile_function, find_compiler
 
 COMPILER = find_compiler()
 pytestmark = [
@@ -29,7 +29,7 @@ POINT = np.array([0.1, 0.2, 0.3])
 PROGRAM = """
 import sys
 import casadi
-from stationkeep.symbolic import kernel
+from stationkeep.symbolic.compiled import kernel
 x = casadi.SX.sym("x", 3)
 bound, export = kernel.export(casadi.Function("tiny", [x], [casadi.sin(2.0 * x)]))
 print(export.compiled, export.cache_hit, export.key, *bound([0.1, 0.2, 0.3])[0])

@@ -18,12 +18,11 @@ from stationkeep.symbolic import (
     ValueFunctions,
     Vehicle,
     closed_form_problem,
-    dynamics,
     find_function,
-    kinematics,
     quadratic,
 )
-from stationkeep.symbolic.compilation import find_compiler
+from stationkeep.symbolic.compiled.compilation import find_compiler
+from stationkeep.symbolic.underwater import dynamics, kinematics
 
 from .fossen import PARAMETERS, random_states
 

@@ -14,8 +14,9 @@ from typing import Any
 import casadi
 import numpy as np
 import pytest
-from stationkeep.symbolic import Model, Vehicle, kernel
-from stationkeep.symbolic.compilation import find_compiler
+from stationkeep.symbolic import Model, Vehicle
+from stationkeep.symbolic.compiled import kernel
+from stationkeep.symbolic.compiled.compilation import find_compiler
 
 from .fossen import random_states
 
@@ -171,7 +172,7 @@ LIMITED = """
 import resource
 import sys
 import casadi
-from stationkeep.symbolic import kernel
+from stationkeep.symbolic.compiled import kernel
 x = casadi.SX.sym("x", 3)
 limit = int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))

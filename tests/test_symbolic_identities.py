@@ -8,7 +8,8 @@ import pytest
 from casadi import SX
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from stationkeep.symbolic import Model, Vehicle, dynamics, kinematics
+from stationkeep.symbolic import Model, Vehicle
+from stationkeep.symbolic.underwater import dynamics, kinematics
 
 from .fossen import PARAMETERS, SHIPPED, Body, jacobian, random_states, rotation
 

@@ -15,9 +15,9 @@ from stationkeep.symbolic import (
     Problem,
     Vehicle,
     closed_form_problem,
-    dynamics,
     require_state,
 )
+from stationkeep.symbolic.underwater import dynamics
 
 Check = Callable[[BaseException], str]
 WEIGHTS: dict[str, Any] = {"Q": np.eye(12), "R": np.eye(6), "W_d": np.eye(6), "gamma": 2.0}

@@ -11,15 +11,7 @@ import pytest
 import scipy.linalg
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
-from stationkeep.symbolic import (
-    Game,
-    InputError,
-    Model,
-    Problem,
-    Vehicle,
-    game_riccati,
-    gamma_star,
-)
+from stationkeep.symbolic import Game, InputError, Model, Problem, Vehicle, game_riccati, gamma_star
 
 from .fossen import PARAMETERS, SHIPPED
 

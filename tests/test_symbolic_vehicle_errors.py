@@ -12,7 +12,7 @@ import pytest
 from stationkeep.symbolic import InputError, Vehicle
 
 Check = Callable[[BaseException], str]
-FILE = resources.files("stationkeep.symbolic").joinpath("vehicles", "bluerov2-heavy.toml")
+FILE = resources.files("stationkeep.symbolic.underwater").joinpath("vehicles", "bluerov2-heavy.toml")
 TEXT = FILE.read_text(encoding="utf-8")
 ALLOCATION = np.array(tomllib.loads(TEXT)["thrusters"]["allocation"])
 CENTER = "center_of_gravity = [0.0, 0.0, 0.0]"

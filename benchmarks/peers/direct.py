@@ -5,7 +5,7 @@ from __future__ import annotations
 from stationkeep.offline import DirectSolver
 from stationkeep.offline.settings import Method
 from stationkeep.symbolic import Problem
-from stationkeep.symbolic.vehicle import Array
+from stationkeep.symbolic.arrays import Array
 
 from .game import Mesh, Solve
 

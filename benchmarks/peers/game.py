@@ -16,9 +16,9 @@ import casadi
 import numpy as np
 from casadi import DM, SX
 from scipy.linalg import expm
-from stationkeep.offline.mesh import graded_mesh
+from stationkeep.offline.path import graded_mesh
 from stationkeep.symbolic import Problem
-from stationkeep.symbolic.vehicle import Array
+from stationkeep.symbolic.arrays import Array
 
 Solve = Callable[[Array], float]
 

@@ -10,7 +10,7 @@ import casadi
 import maptor
 import numpy as np
 from stationkeep.symbolic import Problem
-from stationkeep.symbolic.vehicle import Array
+from stationkeep.symbolic.arrays import Array
 
 from .game import LinearGuess, Mesh, Solve, point_function
 

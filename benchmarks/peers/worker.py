@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from stationkeep.symbolic import Problem
-from stationkeep.symbolic.vehicle import Array
+from stationkeep.symbolic.arrays import Array
 
 from .game import Mesh, Solve
 

@@ -15,7 +15,7 @@ import numpy as np
 import yapss
 from casadi import SX
 from stationkeep.symbolic import Problem
-from stationkeep.symbolic.vehicle import Array
+from stationkeep.symbolic.arrays import Array
 
 from .game import LinearGuess, Mesh, Solve, point_function
 

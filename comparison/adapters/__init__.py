@@ -1,0 +1,5 @@
+"""Other libraries and file formats; each is imported only when it is used."""
+
+from .matlab import export_mat
+
+__all__ = ["export_mat"]

@@ -1,0 +1,3 @@
+"""Regret and worst cases for benchmarks."""
+
+__all__ = []

@@ -1,0 +1,33 @@
+"""Certified optima from many states, and the ideal weights that fit them."""
+
+from .ideal import (
+    HELD_OUT,
+    SIZES,
+    TRAINING,
+    Bounds,
+    Ideal,
+    certified_pairs,
+    envelope_states,
+    fit,
+    ideal_record,
+    load_ideal,
+    require_numbers,
+)
+from .optima import CERTIFICATE, Optima, record_path
+
+__all__ = [
+    "CERTIFICATE",
+    "HELD_OUT",
+    "SIZES",
+    "TRAINING",
+    "Bounds",
+    "Ideal",
+    "Optima",
+    "certified_pairs",
+    "envelope_states",
+    "fit",
+    "ideal_record",
+    "load_ideal",
+    "record_path",
+    "require_numbers",
+]

@@ -1,0 +1,36 @@
+"""Runs and optima as records that are kept, and run again from what they hold alone."""
+
+from .clairvoyant import KIND, clairvoyant_record, optimum_name
+from .replay import BIT_EQUAL, DIFFERENT, Replay, replay
+from .runs import (
+    FORMAT,
+    OFFLINE_KEY,
+    contender_record,
+    online_record,
+    optimal_record,
+    optimum_or_failure,
+    optimum_provenance,
+    provenance,
+    reused,
+    trajectory_of,
+)
+
+__all__ = [
+    "BIT_EQUAL",
+    "DIFFERENT",
+    "FORMAT",
+    "KIND",
+    "OFFLINE_KEY",
+    "Replay",
+    "clairvoyant_record",
+    "contender_record",
+    "online_record",
+    "optimal_record",
+    "optimum_name",
+    "optimum_or_failure",
+    "optimum_provenance",
+    "provenance",
+    "replay",
+    "reused",
+    "trajectory_of",
+]

@@ -1,0 +1,284 @@
+"""The runs of a scenario as records that are kept: made once, reused while nothing has changed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
+from ...online import Policy, load, run, save, to_dataset
+from ...online.records import versions
+from ...online.vehicle import Progress
+from ...symbolic import InputError, RunError, StationKeeping
+from ...symbolic.arrays import Array
+from ...symbolic.underwater import STATE_NAMES
+from ..policies import contender
+from ..scenario import Scenario
+from .record_files import with_files
+
+FORMAT = 7  # of the records; raise it when what is in them, or how a run is made, changes
+OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
+
+
+def provenance(
+    scenario: Scenario, kind: str, include: set[str] | Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return the attributes that say where a record comes from.
+
+    `key` is the hash of what the numbers depend on: the settings (those named in `include`, or all),
+    the vehicle's parameters, the compiled functions and the versions.
+    """
+    station = scenario.station_keeping()
+    vehicle = station.model.vehicle
+    text = scenario.model_dump_json(include=include)
+    learned = include is None or "basis" in include
+    functions = station.fingerprint if learned else station.plant_fingerprint
+    parts = [str(FORMAT), kind, text, vehicle.model_dump_json(), functions]
+    parts.append(repr(sorted(versions().items())))
+    start = scenario.initial_weights() if include is None else None
+    parts.append("" if start is None else start.tobytes().hex())
+    simulated = include is None or "simulation" in include
+    driven = scenario.plant_vehicle() if simulated else None
+    plant = "" if driven is None else driven.model_dump_json()
+    parts.append(plant)
+    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
+    return {
+        "kind": kind,
+        "scenario": scenario.model_dump_json(),
+        "vehicle": vehicle.model_dump_json(),
+        "plant": plant,
+        "mode": scenario.simulation.mode,
+        "seed": scenario.samples.seed,
+        "functions": functions,
+        "format": FORMAT,
+        "machine": machine(),
+        "key": key,
+    }
+
+
+def machine() -> str:
+    """Return the kind of machine and the widest vector instructions that numpy found on it."""
+    found = np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", [])
+    return " ".join([platform.system(), platform.machine(), *found[-1:]])
+
+
+def online_record(
+    scenario: Scenario,
+    path: Path | None = None,
+    *,
+    policy: Callable[[], Policy] | None = None,
+    kind: str = "learned",
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Return the record of a closed-loop run, from `path` if it holds this very run.
+
+    Parameters
+    ----------
+    policy : makes what drives the vehicle; the scenario's controller if None
+    kind : names the policy in the record
+    """
+    attributes = provenance(scenario, kind)
+
+    def make() -> xr.Dataset:
+        history = run(scenario, None if policy is None else policy(), progress)
+        attributes["wall_seconds"] = history.wall_seconds
+        return with_files(to_dataset(history, attributes), scenario)
+
+    record = reused(path, attributes["key"], make)
+    if str(record.attrs["stopped"]).startswith("interrupted"):
+        raise KeyboardInterrupt  # the part that was run is kept
+    return record
+
+
+def contender_record(
+    scenario: Scenario, name: str, path: Path | None = None, progress: Progress | None = None
+) -> xr.Dataset:
+    """Return the record of a contender's run, from `path` if it holds this very run."""
+    one = contender(name)
+    changed = one.changed(scenario)
+    return online_record(changed, path, policy=lambda: one.make(changed), kind=name, progress=progress)
+
+
+def optimal_record(
+    scenario: Scenario, solver: OfflineSolver, path: Path | None = None, zeta0: Array | None = None
+) -> xr.Dataset:
+    """Return the record of the offline optimum from ζ_0, from `path` if it holds this very solve.
+
+    Raises
+    ------
+    RunError
+        If the solver does not converge; that is kept too.
+    """
+    start = scenario.initial_state if zeta0 is None else zeta0
+    attributes = optimum_provenance(scenario, start)
+    record = reused(
+        path, attributes["key"], lambda: optimum_or_failure(scenario, solver, start, attributes)
+    )
+    if "failed" in record.attrs:
+        raise RunError(str(record.attrs["failed"]))
+    return record
+
+
+def optimum_provenance(scenario: Scenario, zeta0: Array, guess: str = "") -> dict[str, Any]:
+    """Return `provenance` of the optimum from ζ_0; `guess` is the key of the one it starts from."""
+    kind = f"optimal from {zeta0.tolist()}" + (f", started from {guess}" if guess else "")
+    return provenance(scenario, kind, OFFLINE_KEY)
+
+
+def optimum_or_failure(
+    scenario: Scenario,
+    solver: OfflineSolver,
+    zeta0: Array,
+    attributes: dict[str, Any],
+    guess: Trajectory | None = None,
+) -> xr.Dataset:
+    """Return the record of the optimum from ζ_0, or of the solver's failure there.
+
+    A search that fails from `guess` starts again from the linear policy. Where that does not converge
+    either the record holds the reason, `failed`, and no trajectory.
+    """
+    started = time.perf_counter()
+    try:
+        solution = _solve(solver, zeta0, guess)
+    except RunError as error:
+        attributes = {
+            **attributes,
+            "failed": str(error),
+            "certified_seconds": time.perf_counter() - started,
+        }
+        return failure_record(zeta0, attributes)
+    return optimum_to_dataset(scenario, solution, attributes)
+
+
+def failure_record(zeta0: Array, attributes: dict[str, Any]) -> xr.Dataset:
+    """Return the record of a solve from ζ_0 that failed: the state, versions, no trajectory."""
+    attributes = attributes | versions()
+    return xr.Dataset({"zeta": ("state", zeta0)}, {"state": list(STATE_NAMES)}, attributes)
+
+
+def _solve(solver: OfflineSolver, zeta0: Array, guess: Trajectory | None) -> OfflineSolution:
+    if guess is not None:
+        with suppress(RunError):
+            solution = solver.solve(zeta0, guess)
+            if not solution.faults:
+                return solution
+    return solver.solve(zeta0)
+
+
+def trajectory_of(record: xr.Dataset) -> Trajectory:
+    """Return the trajectory of an optimum's record, bit for bit the one that was kept."""
+    return Trajectory(
+        mesh=record["mesh"].values,
+        times=record["time"].values,
+        states=record["zeta"].values,
+        v=record["v"].values,
+        degree=int(record.attrs["degree"]),
+    )
+
+
+def optimum_to_dataset(
+    scenario: Scenario, solution: OfflineSolution, attributes: dict[str, Any]
+) -> xr.Dataset:
+    """Return the record of an offline solution: trajectory, forces, cost and certificate."""
+    path, direct = solution.direct.trajectory, solution.direct
+    station = scenario.station_keeping()
+    u_control, u_disturbance = path.players(station.game)
+    local = station.game.local_cost(path.states[1:], u_control, u_disturbance)
+    dataset = path_dataset(station, path, u_control, local, attributes | _described(solution))
+    forces, units = ("node", "force"), {"units": "N, N m"}
+    more = {
+        "u_disturbance": (forces, u_disturbance, units),
+        "v": (forces, path.v, units),
+        "costate": (("state",), direct.costate, {"units": "cost per unit of the state"}),
+    }
+    return dataset.assign(more)
+
+
+def path_dataset(
+    station: StationKeeping,
+    path: Trajectory,
+    u_control: Array,
+    local: Array,
+    attributes: dict[str, Any],
+) -> xr.Dataset:
+    """Return the record of a collocated way: states, control, wrench and cost.
+
+    Parameters
+    ----------
+    u_control : (K d, 6) at the collocation points
+    local : (K d,) cost rate there
+    """
+    tau_b = [
+        station.model.kinematics(zeta[:6])[0].T @ (u + station.model.u_trim)
+        for zeta, u in zip(path.states[1:], u_control, strict=True)
+    ]
+    forces, units = ("node", "force"), {"units": "N, N m"}
+    data = {
+        "zeta": (("time", "state"), path.states, {"units": "m, rad, m/s, rad/s"}),
+        "u_control": (forces, u_control, units),
+        "tau_b": (forces, np.array(tau_b), units),
+        "local_cost": (("node",), local, {"units": "cost/s"}),
+        "cost": (("time",), path.quadrature(local), {"units": "cost"}),
+    }
+    coordinates = {
+        "time": ("time", path.times, {"units": "s"}),
+        "node": ("node", path.times[1:], {"units": "s"}),
+        "mesh": ("mesh", path.mesh, {"units": "s"}),
+        "state": list(STATE_NAMES),
+    }
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def _described(solution: OfflineSolution) -> dict[str, Any]:
+    """Return what a record's attributes tell of a solution: value, certificate, how it was found."""
+    direct, path = solution.direct, solution.direct.trajectory
+    return {
+        **versions(),
+        **{name: float(value) for name, value in vars(solution.certificate).items()},
+        "degree": path.degree,
+        "intervals": len(path.mesh) - 1,
+        "rounds": solution.rounds,
+        "method": direct.method,
+        "extremals": json.dumps([_extremal(solution, other) for other in solution.others]),
+        "value": direct.value,
+        "iterations": direct.iterations,
+        "seconds": direct.seconds,
+        "certified_seconds": solution.seconds,
+        "faults": "; ".join(solution.faults),
+    }
+
+
+def _extremal(solution: OfflineSolution, other: DirectSolution) -> dict[str, Any]:
+    """Return what is told of a further extremal: by how much it is dearer, relative to the value."""
+    return {
+        "value": other.value,
+        "gap": (other.value - solution.value) / solution.value,
+        "second_order": other.second_order,
+        "costate": other.costate.tolist(),
+    }
+
+
+def reused(path: Path | None, key: str, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+    """Return the record at `path` if it is whole and of this key, or make it and keep it there."""
+    if path is not None and path.is_file():
+        try:
+            kept = load(path)
+            # an interrupted run is made again; one that ended by itself would end so again
+            whole = not str(kept.attrs.get("stopped", "")).startswith("interrupted")
+            if kept.attrs.get("key") == key and whole:
+                return kept
+        except InputError:
+            pass  # a record that can't be read is made again
+    dataset = make()
+    if path is not None:
+        save(dataset, path)
+    return dataset

@@ -1,0 +1,7 @@
+"""A scenario: the one input of the online run and of the offline optimum."""
+
+from .files import Files
+from .overrides import parse_values, replace_value, value_at
+from .scenario import DEFAULT, Scenario, restored
+
+__all__ = ["DEFAULT", "Files", "Scenario", "parse_values", "replace_value", "restored", "value_at"]

@@ -1,0 +1,30 @@
+"""The contents of the files that a scenario names, so that its record can be run without them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+
+from ...symbolic import Vehicle
+from ...symbolic.arrays import Array
+from ...symbolic.value import BasisFunction
+
+
+@dataclass(frozen=True)
+class Files:
+    """What is taken instead of reading files.
+
+    Attributes
+    ----------
+    vehicles : of `vehicle` and `simulation.plant`, by name
+    bases : of `basis.name`, functions of the scaled state, by name
+    weights : (m,) that the learner starts from; None where no file says
+    """
+
+    vehicles: Mapping[str, Vehicle] = field(default_factory=dict)
+    bases: Mapping[str, BasisFunction] = field(default_factory=dict)
+    weights: Array | None = None
+
+    def without(self, groups: Collection[str]) -> Files:
+        """Return what still holds when these groups of settings change."""
+        return replace(self, weights=None) if "learner" in groups else self

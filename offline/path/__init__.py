@@ -1,0 +1,32 @@
+"""Meshes, collocation points, and trajectories on them."""
+
+from .gauss import GaussRule
+from .grid import Bent, Grid, Pass, adjoint, backward
+from .interpolation import interpolate
+from .mesh import aligned_mesh, extended, graded_mesh, growing_mesh, halved
+from .plant import Plant, Policy
+from .radau import RadauRule, radau_rule
+from .trajectory import Trajectory
+from .verification import reintegrate, sign_changes
+
+__all__ = [
+    "Bent",
+    "GaussRule",
+    "Grid",
+    "Pass",
+    "Plant",
+    "Policy",
+    "RadauRule",
+    "Trajectory",
+    "adjoint",
+    "aligned_mesh",
+    "backward",
+    "extended",
+    "graded_mesh",
+    "growing_mesh",
+    "halved",
+    "interpolate",
+    "radau_rule",
+    "reintegrate",
+    "sign_changes",
+]

@@ -1,0 +1,121 @@
+"""Settings of the learner and its samples; the `[learner]` and `[samples]` groups of a scenario."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
+
+from ...symbolic.toml import Settings
+from ..laws import Normalizer
+from ..rows import Strategy
+
+
+class LearnerSettings(Settings):
+    """Actor-critic of (17)-(21).
+
+    Attributes
+    ----------
+    rule : `gradient` is (19); `least_squares` is recursive, with forgetting
+    error : what the critic learns from: `bellman`, the Bellman error (17) at the samples, or `costate`,
+        the error of its gradient's policy along predicted trajectories, see `rows.CostateSource`
+    safeguard : move the actors only as far as the model predicts no higher cost, restart them from the
+        reference weights where these are predicted to cost less, and use the linear H-infinity policy
+        where that is
+    horizon : of the predictions [s]; after it the cost is ζ'P ζ
+    steps : of the integration over the horizon
+    normalizer : weight of a row; `paper` is 1/p as printed, see `critic.row_weights`
+    gain_critic : η_c of the row at the state [1/s]
+    gain_samples : η_c of the sample rows [1/s]; as gain_critic when not given
+    average_samples : divide the sum over the samples by N
+    gain_actor_1, gain_actor_2 : η_a1, η_a2 of (20)(21) [1/s]
+    forgetting : β of least squares [1/s]
+    covariance, covariance_bound : Γ(0) and Γ_max as multiples of the identity
+    leash : strength of the ridge towards the reference weights, relative to what the samples know of
+        each weight at the start; 0 is none
+    period : time between learning steps [s]
+    weights : start from the Riccati solution (`riccati`) or from the record of a run (its path)
+    weights_vehicle : whose Riccati solution that is, a shipped name or the path of a TOML file; the
+        scenario's own vehicle when not given
+    weight_factor : multiple of those weights to start from
+    reference : the weights that leash, projection and safeguard hold to: `riccati`, those of the
+        scenario's own vehicle, or `initial`, whatever the learner starts from (and then the safeguard
+        knows of no linear H-infinity policy)
+    weight_bound : projection bound as a multiple of the norm of the reference weights
+    """
+
+    rule: Literal["gradient", "least_squares"] = "least_squares"
+    error: Literal["bellman", "costate"] = "bellman"
+    safeguard: bool = False
+    horizon: PositiveFloat = 30.0
+    steps: Annotated[int, Field(ge=10, le=2000)] = 200
+    normalizer: Normalizer = "paper"
+    gain_critic: NonNegativeFloat = 1.0
+    gain_samples: NonNegativeFloat | None = None
+    average_samples: bool = False
+    gain_actor_1: PositiveFloat = 2.0
+    gain_actor_2: PositiveFloat = 2.0
+    forgetting: NonNegativeFloat = 2.0
+    covariance: PositiveFloat = 1e6
+    covariance_bound: PositiveFloat = 1e8
+    leash: NonNegativeFloat = 0.0
+    period: PositiveFloat = 0.25
+    weights: str = "riccati"
+    weights_vehicle: str | None = None
+    weight_factor: float = 1.0
+    reference: Literal["riccati", "initial"] = "riccati"
+    weight_bound: Annotated[float, Field(gt=1.0)] = 3.0
+
+    @model_validator(mode="after")
+    def _consistent(self) -> LearnerSettings:
+        if self.covariance > self.covariance_bound:
+            raise ValueError(
+                f"covariance is {self.covariance:g}, but must not exceed covariance_bound = "
+                f"{self.covariance_bound:g}; raise the bound"
+            )
+        if self.forgetting * self.period > 1.0:
+            raise ValueError(
+                f"forgetting * period is {self.forgetting * self.period:g}, but must be at most 1 for "
+                "the covariance to stay bounded; learn more often or forget more slowly"
+            )
+        if self.weights_vehicle is not None and self.weights != "riccati":
+            raise ValueError(
+                f"weights_vehicle is '{self.weights_vehicle}' and weights '{self.weights}', but only a "
+                'Riccati solution belongs to a vehicle; leave one out, or set weights = "riccati"'
+            )
+        return self
+
+
+class SampleSettings(Settings):
+    """Sample points ζ_j of (18), and the trajectories that are predicted for `costate` rows.
+
+    Attributes
+    ----------
+    strategy : `fixed` in the envelope, `shrinking` with the state, or along the predicted `trajectory`
+    number : N of the points
+    seed : of everything that is drawn
+    inner : fixed and shrinking points are shrunk by a factor uniform on (inner, 1), so that some lie
+        near the origin
+    spread : of moving points around the state or the trajectory, as a part of its largest scaled entry
+    ahead : part of the predicted trajectory that the points follow [s]
+    paths : trajectories predicted for `costate` rows, the first from the state itself
+    path_points : points of each that give rows
+    remember : also learn weights for the whole envelope, to be used when learning is switched off
+    """
+
+    strategy: Strategy = "fixed"
+    number: NonNegativeInt = 600
+    seed: NonNegativeInt = 1
+    inner: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
+    spread: PositiveFloat = 0.5
+    ahead: PositiveFloat = 12.0
+    paths: PositiveInt = 4
+    path_points: Annotated[int, Field(ge=2)] = 20
+    remember: bool = False

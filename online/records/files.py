@@ -1,0 +1,118 @@
+"""netCDF and text files: written whole under a temporary name and renamed; read into memory."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import h5py  # type: ignore[import-untyped]
+import numpy as np
+import xarray as xr
+
+from ...symbolic import InputError
+from ...symbolic.arrays import Array
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that numbers depend on."""
+    packages = ("stationkeep", "casadi", "numpy", "scipy")
+    return {f"{package}_version": version(package) for package in packages}
+
+
+def save(dataset: xr.Dataset, path: Path) -> Path:
+    """Write a record as netCDF under a temporary name, then rename it.
+
+    Raises
+    ------
+    InputError
+        If the folder can't be written.
+    """
+    content = dataset.to_netcdf(engine="h5netcdf")  # in memory: HDF5 does not survive a full disk
+    with written_whole(path) as temporary:
+        temporary.write_bytes(content)
+    return path
+
+
+def load(path: Path) -> xr.Dataset:
+    """Read a record into memory.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, unreadable, truncated or not a record.
+    """
+    if not path.is_file():
+        raise InputError(f"there is no record '{path}'; give the path of a netCDF file of a run")
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+            return dataset.load()
+    except (OSError, ValueError, KeyError, RuntimeError):
+        raise InputError(
+            f"'{path}' can't be read as a record; it may be truncated, make it again"
+        ) from None
+
+
+def read_parts(path: Path, *names: str) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Read a record's attributes and the variables named, thirty times as fast as `load`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or has no such variables.
+    """
+    try:
+        with h5py.File(path) as file:
+            attributes = {
+                name: np.asarray(value).item()
+                for name, value in file.attrs.items()
+                if not name.startswith("_")  # netCDF's own
+            }
+            return attributes, {name: np.asarray(file[name]) for name in names}
+    except (OSError, KeyError, ValueError):
+        raise InputError(f"'{path}' can't be read as a record; make it again") from None
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path`, and rename it to `path` when the block succeeds.
+
+    Raises
+    ------
+    InputError
+        If the folder can't be made or written (unwritable, full).
+    """
+    temporary = path.with_name(f".{path.name}-{os.getpid()}-{uuid.uuid4().hex[:8]}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        temporary.replace(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(
+            f"'{path}' can't be written ({reason}); choose another folder with --out"
+        ) from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def remove_temporaries(folder: Path, pattern: str) -> None:
+    """Remove what killed runs left of files like `pattern`; nobody may be writing one."""
+    for path in folder.glob(f".{pattern}-*-*"):
+        if re.search(r"-\d+-[0-9a-f]{8}$", path.name):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text file under a temporary name, then rename it; raises as `written_whole`."""
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    return path

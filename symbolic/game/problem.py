@@ -1,0 +1,216 @@
+"""A game on a plant: what the learner and the offline solvers need to know, and nothing more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import casadi
+import numpy as np
+from casadi import DM, SX
+from numpy.typing import NDArray
+
+from ..arrays import Array
+from ..errors import GammaTooSmallError, InputError
+from . import riccati
+from .game import Game
+
+
+@dataclass(frozen=True, eq=False)
+class InverseDynamics:
+    """The input that gives a fully actuated plant a wanted acceleration.
+
+    Attributes
+    ----------
+    acceleration : (k,) symbol a = η_ddot
+    v : (k,) expression of ζ = (η, η_dot) and a with f(ζ) + g(ζ) v = (η_dot, a)
+    """
+
+    acceleration: SX
+    v: SX
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """ζ_dot = f(ζ) + g(ζ) (u_1 + u_2) with f(0) = 0, and the game played on it.
+
+    Attributes
+    ----------
+    name : appears in messages and files
+    zeta : (n,) symbol
+    drift : (n,) expression f of `zeta`, the steady trim already taken out
+    input_matrix : (n, k) expression g of `zeta`
+    game : the weights
+    scale : (n,) half-widths of the envelope, the unit of the scaled state x = ζ / scale
+    switching : (s,) expressions of `zeta`; f is only C^1 where one of them changes sign
+    inverse_dynamics : for ζ = (η, η_dot) with as many inputs as η has entries; None if there is none
+
+    Raises
+    ------
+    InputError
+        If the shapes disagree, f(0) is not 0, the scale is not positive, or the inverse dynamics
+        contradict f and g.
+    """
+
+    name: str
+    zeta: SX
+    drift: SX
+    input_matrix: SX
+    game: Game
+    scale: Array
+    switching: SX = field(default_factory=lambda: SX(0, 1))
+    inverse_dynamics: InverseDynamics | None = None
+
+    def __post_init__(self) -> None:
+        n, k = self.n_states, self.n_inputs
+        if self.drift.shape != (n, 1) or self.input_matrix.shape[0] != n:
+            raise InputError(f"{self.name}: f must be ({n},) and g must have {n} rows")
+        if self.game.Q.shape != (n, n) or self.game.R.shape != (k, k):
+            raise InputError(
+                f"{self.name}: Q has {len(self.game.Q)} rows and R has {len(self.game.R)}, but {n} "
+                f"states and {k} inputs need {n} and {k}; give one weight for each"
+            )
+        if self.scale.shape != (n,) or not np.all(np.isfinite(self.scale) & (self.scale > 0.0)):
+            raise InputError(f"{self.name}: the scale must be {n} positive half-widths")
+        residual = float(np.abs(self._at_origin(self.drift)).max())
+        if not residual < 1e-9:
+            raise InputError(
+                f"{self.name}: f(0) must be 0, but its largest entry is {residual:.3g}; "
+                "take the steady trim out first"
+            )
+        if self.inverse_dynamics is not None:
+            self._require_inverse(self.inverse_dynamics)
+
+    @property
+    def n_states(self) -> int:
+        """Number of states n."""
+        return int(self.zeta.shape[0])
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs k of each player."""
+        return int(self.input_matrix.shape[1])
+
+    @cached_property
+    def linearization(self) -> tuple[Array, Array]:
+        """A = ∂f/∂ζ (n, n) and B = g (n, k) at the origin."""
+        A = self._at_origin(casadi.jacobian(self.drift, self.zeta))
+        return A, self._at_origin(self.input_matrix)
+
+    @cached_property
+    def P(self) -> Array:
+        """Stabilising game Riccati solution, (n, n): V = ζ'P ζ near the origin."""
+        return riccati.game_riccati(*self.linearization, self.game)
+
+    @cached_property
+    def P_gamma(self) -> Array:
+        """dP/dγ, (n, n), negative semidefinite: ζ'P ζ falls as the disturbance gets dearer."""
+        return riccati.gamma_derivative(*self.linearization, self.game, self.P)
+
+    @cached_property
+    def linear_gains(self) -> tuple[Array, Array]:
+        """K_1 = R^-1 B'P and K_2 = γ^-2 W_d^-1 B'P, each (k, n).
+
+        u_1 = -K_1 ζ and u_2 = K_2 ζ are the linear H-infinity policies.
+        """
+        _, B = self.linearization
+        push = B.T @ self.P
+        return self.game.R_inverse @ push, self.game.disturbance_inverse @ push
+
+    @cached_property
+    def linear_gain(self) -> Array:
+        """-R_eff^-1 B'P, (k, n): v of the linear H-infinity policy is this times ζ."""
+        _, B = self.linearization
+        return np.asarray(-self.game.R_eff_inverse @ B.T @ self.P)
+
+    @cached_property
+    def closed_loop_modes(self) -> NDArray[np.complex128]:
+        """Eigenvalues of A + B `linear_gain`, the linearised game's closed loop [1/s], (n,)."""
+        A, B = self.linearization
+        return np.asarray(np.linalg.eigvals(A + B @ self.linear_gain), dtype=np.complex128)
+
+    @property
+    def decay_rate(self) -> float:
+        """Rate of the slowest mode of the linearised game's closed loop [1/s], positive."""
+        return -float(self.closed_loop_modes.real.max())
+
+    @cached_property
+    def gamma_star(self) -> float:
+        """Smallest attenuation level γ* of the linearised game [-]."""
+        game = self.game
+        return riccati.gamma_star(*self.linearization, game.Q, game.R, game.W_d)
+
+    def linearized(self) -> Problem:
+        """Return the linear-quadratic game at the origin; its value is ζ'P ζ exactly."""
+        A, B = self.linearization
+        return replace(
+            self,
+            name=f"{self.name}, linearised",
+            drift=DM(A) @ self.zeta,
+            input_matrix=SX(DM(B)),
+            switching=SX(0, 1),
+            inverse_dynamics=self._linear_inverse(A, B),
+        )
+
+    def with_game(self, game: Game) -> Problem:
+        """Return the same plant under another game."""
+        return replace(self, game=game)
+
+    def with_gamma(self, gamma: float) -> Problem:
+        """Return the same problem at another attenuation level; the error names γ*."""
+        old = self.game
+        try:
+            return self.with_game(Game(old.Q, old.R, old.W_d, gamma))
+        except GammaTooSmallError as error:
+            raise GammaTooSmallError(gamma, error.threshold, self.gamma_star) from None
+
+    def _linear_inverse(self, A: Array, B: Array) -> InverseDynamics | None:
+        """v = B_2^-1 (a - A_2 ζ) from the lower rows of A and B."""
+        if self.inverse_dynamics is None:
+            return None
+        a, k = self.inverse_dynamics.acceleration, self.n_inputs
+        inverse = np.linalg.inv(B[k:])
+        return InverseDynamics(a, DM(inverse) @ (a - DM(A[k:]) @ self.zeta))
+
+    def _require_inverse(self, inverse: InverseDynamics) -> None:
+        """Compare f + g v with (η_dot, a) at seeded points of the scale."""
+        n, k = self.n_states, self.n_inputs
+        if n != 2 * k:
+            raise InputError(f"{self.name}: inverse dynamics need 2 k states, but {n} is not 2 x {k}")
+        wanted = casadi.vertcat(self.zeta[k:], inverse.acceleration)
+        residual = casadi.Function(
+            "residual",
+            [self.zeta, inverse.acceleration],
+            [self.drift + self.input_matrix @ inverse.v - wanted],
+        )
+        rng = np.random.default_rng(0)
+        worst = 0.0
+        for _ in range(3):
+            at = residual(rng.uniform(-0.5, 0.5, n) * self.scale, rng.uniform(-1, 1, k))
+            worst = max(worst, float(np.abs(np.array(DM(at))).max()))
+        if not worst < 1e-9:
+            raise InputError(
+                f"{self.name}: the inverse dynamics contradict f and g by {worst:.2g}; correct them"
+            )
+
+    def _at_origin(self, expression: SX) -> Array:
+        value = casadi.Function("at_origin", [self.zeta], [expression])(np.zeros(self.n_states))
+        return np.array(DM(value).full(), dtype=float)
+
+
+def closed_form_problem(R: float = 1.0, gamma: float = 2.0) -> Problem:
+    """Return the two-state game with the known value V* = ζ_1^2 / 2 + ζ_2^2.
+
+    c = cos(2 ζ_1) + 2, k = 1/R - 1/γ^2, Q = I, g = (0, c) and
+    f = (-ζ_1 + ζ_2, -ζ_1/2 - ζ_2/2 (1 - k c^2)). The residual of (7) is exactly zero, so the ideal
+    weights on (ζ_1^2, ζ_1 ζ_2, ζ_2^2) are (1/2, 0, 1) for any R > 0 and γ^2 > R (after Vamvoudakis
+    and Lewis 2010, with the disturbance in the same channel).
+    """
+    zeta = SX.sym("zeta", 2)
+    c = casadi.cos(2 * zeta[0]) + 2
+    game = Game(np.eye(2), np.array([R]), np.eye(1), gamma)
+    k = 1 / R - gamma**-2
+    drift = casadi.vertcat(-zeta[0] + zeta[1], -zeta[0] / 2 - zeta[1] / 2 * (1 - k * c**2))
+    return Problem(
+        "two-state game", zeta, drift, casadi.vertcat(SX(1, 1), c), game, np.array([2.0, 2.0])
+    )

@@ -1,0 +1,22 @@
+"""Underwater vehicles (1)-(3): parameters, kinematics, dynamics, and the problem that they make."""
+
+from .dynamics import acceleration, earth_frame, inverse_dynamics
+from .kinematics import jacobian, jacobian_inverse
+from .model import STATE_NAMES, Model, require_pitch, require_state
+from .station import StationKeeping
+from .vehicle import Thrusters, Vehicle
+
+__all__ = [
+    "STATE_NAMES",
+    "Model",
+    "StationKeeping",
+    "Thrusters",
+    "Vehicle",
+    "acceleration",
+    "earth_frame",
+    "inverse_dynamics",
+    "jacobian",
+    "jacobian_inverse",
+    "require_pitch",
+    "require_state",
+]

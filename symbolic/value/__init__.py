@@ -1,0 +1,20 @@
+"""The value function (10)-(15): bases, compiled policies, and predicted paths."""
+
+from .basis import Basis, BasisFunction, drag, drag_cubic, find_function, quadratic
+from .functions import PointTerms, ValueFunctions
+from .prediction import BOUND, Path, Prediction, growing_steps
+
+__all__ = [
+    "BOUND",
+    "Basis",
+    "BasisFunction",
+    "Path",
+    "PointTerms",
+    "Prediction",
+    "ValueFunctions",
+    "drag",
+    "drag_cubic",
+    "find_function",
+    "growing_steps",
+    "quadratic",
+]

@@ -1,0 +1,230 @@
+"""Predicted closed-loop trajectories, their cost and its gradient, as compiled functions.
+
+Under the policies (14)(15) of given actor weights the model obeys ζ_dot = F(ζ), with the local cost
+r(ζ) = r(ζ, û_1, û_2). One call integrates both over the whole horizon by the classical Runge-Kutta
+method with fixed steps, and one more yields the costates
+
+    λ(t) = ∂J(ζ(t)) / ∂ζ,   J(ζ(t)) = ∫_t^T r dτ + ζ(T)'P ζ(T),
+    -λ_dot = r_ζ' + F_ζ'λ,   λ(T) = 2 P ζ(T)
+
+as the exact gradient of the discretised cost (reverse mode, one step at a time). -λ_dot = ... is the
+gradient of the Bellman equation r + V_ζ F = 0 along the path, so λ is what V_ζ has to be there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi
+import numpy as np
+from casadi import DM, MX, SX
+
+from ..arrays import Array
+from ..compiled import Kernel, dense_function
+from ..game import Problem
+from ..integration import runge_kutta_step
+from .basis import Basis
+
+BOUND = 4.0  # half-widths; a path that gets farther counts as lost, and its cost is infinite
+Exporter = Callable[[casadi.Function, int], Kernel]
+
+
+@dataclass(frozen=True)
+class Path:
+    """A predicted trajectory at the ends of its steps.
+
+    Attributes
+    ----------
+    times : (N + 1,) [s]
+    states : (N + 1, n); from where the path left the bound, they stay where they were
+    cost_to_go : (N + 1,) J from each of them; infinite when the path left
+    costates : (N + 1, n) λ, or None when only the path was asked for
+    """
+
+    times: Array
+    states: Array
+    cost_to_go: Array
+    costates: Array | None = None
+
+    @property
+    def cost(self) -> float:
+        """J of the whole path; infinite when it left."""
+        return float(self.cost_to_go[0])
+
+
+def growing_steps(horizon: float, n_steps: int, growth: float = 5.0) -> Array:
+    """Return N steps that add up to the horizon, the last `growth` times the first, shape (N,) [s].
+
+    The fast modes are damped within a second or two; what is left is slow.
+    """
+    steps = np.linspace(1.0, growth, n_steps)
+    return np.asarray(horizon / steps.sum() * steps)
+
+
+class Prediction:
+    """Predict N steps under given actor weights.
+
+    A policy that is too stiff for the steps makes the path leave the bound: such a policy counts as
+    bad, never as good.
+
+    Parameters
+    ----------
+    problem, basis : of the policies
+    n_steps : N
+    exporter : makes a kernel of a function and its number of operations
+    """
+
+    def __init__(self, problem: Problem, basis: Basis, n_steps: int, exporter: Exporter) -> None:
+        self.problem = problem
+        self.basis = basis
+        self.n_steps = n_steps
+        self._exporter = exporter
+        self._row_kernels: dict[int, Kernel] = {}
+
+    def path(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> Path:
+        """Return the path from ζ (n,) under Ŵ_a1, Ŵ_a2 (m,) over `steps` (N,) [s]."""
+        (nodes,) = self._path_kernel(zeta, actor_1, actor_2, steps)
+        return self._as_path(nodes, steps)
+
+    def linear_path(self, zeta: Array, steps: Array) -> Path:
+        """Return the path from ζ (n,) under the linear policies u_1 = -K_1 ζ and u_2 = K_2 ζ."""
+        (nodes,) = self._linear_kernel(zeta, steps)
+        return self._as_path(nodes, steps)
+
+    def costates(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> Path:
+        """Return the same path with its costates."""
+        nodes, costates = self._costate_kernel(zeta, actor_1, actor_2, steps)
+        return self._as_path(nodes, steps, costates.T)
+
+    def rows(self, points: Array, costates: Array) -> tuple[Array, Array, Array]:
+        """Return L g'σ'^T (N, k, m), L g'λ (N, k) and σ (N, m) at N points, L'L = R_eff^-1 / 4.
+
+        |L g'(σ'^T W - λ)|^2 is what the policy of the weights W costs per second more than the one of
+        the value with the gradient λ.
+        """
+        n_points, k, m = len(points), self.problem.n_inputs, self.basis.n_basis
+        if n_points not in self._row_kernels:
+            self._row_kernels[n_points] = self._rows_of(n_points)
+        kernel = self._row_kernels[n_points]
+        kernel.inputs[0].T[...] = points
+        kernel.inputs[1].T[...] = costates
+        kernel.evaluate()
+        regressors, targets, sigma = (output.ravel(order="K") for output in kernel.outputs)
+        by_point = regressors.reshape(n_points, m, k).transpose(0, 2, 1)
+        return by_point, targets.reshape(n_points, k), sigma.reshape(n_points, m)
+
+    def _as_path(self, nodes: Array, steps: Array, costates: Array | None = None) -> Path:
+        n = self.problem.n_states
+        states, cost, clock = nodes[:n].T, nodes[n], nodes[n + 1]
+        stayed = clock[-1] >= (1.0 - 1e-6) * steps.sum()
+        rest = float(states[-1] @ self.problem.P @ states[-1])
+        to_go = cost[-1] + rest - cost if stayed else np.full(len(cost), np.inf)
+        return Path(np.append(0.0, np.cumsum(steps)), states, to_go, costates)
+
+    @cached_property
+    def _step(self) -> casadi.Function:
+        """One Runge-Kutta step of (ζ, cost, clock) under the policies of given weights."""
+        return self._step_of(self._rates)
+
+    def _step_of(self, rates: casadi.Function) -> casadi.Function:
+        """Return a step of rates with parameters; outside the bound nothing moves any more."""
+        n = self.problem.n_states
+        y, dt = MX.sym("y", n + 2), MX.sym("dt")
+        parameters = [MX.sym(rates.name_in(i), *rates.size_in(i)) for i in range(1, rates.n_in())]
+        moved = runge_kutta_step(lambda at: rates(at, *parameters), y, dt)
+        inside = casadi.mmax(casadi.fabs(moved[:n] / DM(self.problem.scale))) < BOUND
+        return casadi.Function("step", [y, *parameters, dt], [casadi.if_else(inside, moved, y)])
+
+    @cached_property
+    def _rates(self) -> casadi.Function:
+        """Rates of (ζ, cost, clock) under the policies (14)(15)."""
+        game, m = self.problem.game, self.basis.n_basis
+        actors = [SX.sym("actor_1", m), SX.sym("actor_2", m)]
+        push_1, push_2 = (
+            self.problem.input_matrix.T
+            @ casadi.gradient(casadi.dot(weights, self.basis.sigma), self.problem.zeta)
+            for weights in actors
+        )
+        u_1, u_2 = -0.5 * DM(game.R_inverse) @ push_1, 0.5 * DM(game.disturbance_inverse) @ push_2
+        return self._rates_under(u_1, u_2, actors)
+
+    def _rates_under(self, u_1: SX, u_2: SX, parameters: list[SX]) -> casadi.Function:
+        problem, game = self.problem, self.problem.game
+        y = SX.sym("y", problem.n_states + 2)
+        cost = casadi.dot(problem.zeta, DM(game.Q) @ problem.zeta) + casadi.dot(u_1, DM(game.R) @ u_1)
+        if np.isfinite(game.gamma):
+            cost -= game.gamma**2 * casadi.dot(u_2, DM(game.W_d) @ u_2)
+        rates = casadi.vertcat(problem.drift + problem.input_matrix @ (u_1 + u_2), cost, 1)
+        at_y = casadi.substitute(rates, problem.zeta, y[: problem.n_states])
+        names = ["y", *(f"parameter_{i}" for i in range(len(parameters)))]
+        return casadi.Function("rates", [y, *parameters], [at_y], names, ["rates"], {"cse": True})
+
+    def _symbols(self) -> tuple[MX, list[MX]]:
+        n, m = self.problem.n_states, self.basis.n_basis
+        inputs = [MX.sym("zeta", n), MX.sym("actor_1", m), MX.sym("actor_2", m)]
+        steps = MX.sym("steps", self.n_steps)
+        return self._nodes(self._step, inputs, steps), [*inputs, steps]
+
+    def _nodes(self, step: casadi.Function, inputs: list[MX], steps: MX) -> MX:
+        start = casadi.vertcat(inputs[0], MX.zeros(2))
+        repeated = [casadi.repmat(parameter, 1, self.n_steps) for parameter in inputs[1:]]
+        return casadi.horzcat(start, step.mapaccum(self.n_steps)(start, *repeated, steps.T))
+
+    @cached_property
+    def _path_kernel(self) -> Kernel:
+        nodes, inputs = self._symbols()
+        names = [symbol.name() for symbol in inputs]
+        function = casadi.Function("predicted_path", inputs, [nodes], names, ["nodes"])
+        return self._exporter(function, self._operations(self._rates))
+
+    @cached_property
+    def _linear_kernel(self) -> Kernel:
+        zeta, steps = MX.sym("zeta", self.problem.n_states), MX.sym("steps", self.n_steps)
+        K_1, K_2 = self.problem.linear_gains
+        rates = self._rates_under(-DM(K_1) @ self.problem.zeta, DM(K_2) @ self.problem.zeta, [])
+        nodes = self._nodes(self._step_of(rates), [zeta], steps)
+        names = ["zeta", "steps"]
+        function = casadi.Function("predicted_linear_path", [zeta, steps], [nodes], names, ["nodes"])
+        return self._exporter(function, self._operations(rates))
+
+    @cached_property
+    def _costate_kernel(self) -> Kernel:
+        n = self.problem.n_states
+        nodes, inputs = self._symbols()
+        y, dt = MX.sym("y", n + 2), MX.sym("dt")
+        weights = [MX.sym("actor_1", self.basis.n_basis), MX.sym("actor_2", self.basis.n_basis)]
+        later = MX.sym("costate", n + 2)
+        earlier = casadi.jtimes(self._step(y, *weights, dt), y, later, True)
+        back = casadi.Function("back", [later, y, *weights, dt], [earlier])
+        last = casadi.vertcat(2 * DM(self.problem.P) @ nodes[:n, -1], 1, 0)
+        repeated = [casadi.repmat(symbol, 1, self.n_steps) for symbol in inputs[1:3]]
+        swept = back.mapaccum(self.n_steps)(last, nodes[:, -2::-1], *repeated, inputs[3][::-1].T)
+        costates = casadi.horzcat(swept[:, ::-1], last)[:n, :]
+        names = [symbol.name() for symbol in inputs]
+        outputs = ["nodes", "costates"]
+        function = casadi.Function("predicted_costates", inputs, [nodes, costates], names, outputs)
+        return self._exporter(function, 4 * self._operations(self._rates))
+
+    def _operations(self, rates: casadi.Function) -> int:
+        return int(4 * self.n_steps * rates.n_instructions())
+
+    def _rows_of(self, n_points: int) -> Kernel:
+        problem, n = self.problem, self.problem.n_states
+        costate = SX.sym("costate", n)
+        L = DM(np.linalg.cholesky(problem.game.R_eff_inverse / 4.0).T)
+        push = L @ problem.input_matrix.T
+        outputs = {
+            "regressor": push @ self.basis.jacobian.T,
+            "target": push @ costate,
+            "sigma": self.basis.sigma,
+        }
+        point = dense_function("costate_row", {"zeta": problem.zeta, "costate": costate}, outputs)
+        points, costates = MX.sym("points", n, n_points), MX.sym("costates", n, n_points)
+        mapped = (
+            point.map(n_points, "serial")(points, costates) if n_points > 1 else point(points, costates)
+        )
+        names = ["points", "costates"], ["regressors", "targets", "sigmas"]
+        function = casadi.Function("costate_rows", [points, costates], [*mapped], *names)
+        return self._exporter(function, point.n_instructions() * n_points)
