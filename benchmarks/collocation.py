@@ -17,7 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from stationkeep.comparison import Scenario
 from stationkeep.offline import DirectSolver
-from stationkeep.symbolic import Problem, closed_form_problem
+from stationkeep.symbolic import Problem, two_state_game
 
 REFERENCE_STATE = np.array([2.0, -1.0, 1.0, 0.3, -0.2, 1.0, 0, 0, 0, 0, 0, 0])
 
@@ -57,7 +57,7 @@ def kinks(title: str, zeta: np.ndarray) -> None:
 
 def main() -> None:
     """Print all studies."""
-    two_state = closed_form_problem()
+    two_state = two_state_game()
     zeta = np.array([1.0, -1.5])
     for degree in (2, 3):
         order("two-state game", two_state, zeta, 0.5 * zeta[0] ** 2 + zeta[1] ** 2, degree)

@@ -21,8 +21,8 @@ from stationkeep.symbolic import (
     Problem,
     ValueFunctions,
     Vehicle,
-    closed_form_problem,
     quadratic,
+    two_state_game,
 )
 from stationkeep.symbolic.underwater import earth_frame, jacobian, jacobian_inverse
 
@@ -55,7 +55,7 @@ def model() -> None:
 
 def two_state() -> None:
     """Print what both laws reach on the exact two-state game, and identity (22)."""
-    problem, ideal = closed_form_problem(), np.array([0.5, 0.0, 1.0])
+    problem, ideal = two_state_game(), np.array([0.5, 0.0, 1.0])
     basis = Basis.build("quadratic", quadratic, problem.zeta, np.ones(2))
     samples, start = draw_samples(problem.scale, 30, 0), np.array([0.9, 0.3, 1.5])
     for rule in ("gradient", "least_squares"):

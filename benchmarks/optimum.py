@@ -28,7 +28,7 @@ from stationkeep.offline import (
     WorstCaseSolver,
     linear_policy,
 )
-from stationkeep.symbolic import Problem, closed_form_problem
+from stationkeep.symbolic import Problem, two_state_game
 from stationkeep.symbolic.arrays import Array
 
 FAR_STATE = np.array([2, -1, 1, 0.3, -0.2, 1, 0, 0, 0, 0, 0, 0], dtype=float)
@@ -48,7 +48,7 @@ def envelope_states(problem: Problem, number: int, seed: int = 0) -> Array:
 def exact(_: int) -> None:
     """Games whose value is known: two states, and linear-quadratic in twelve."""
     print("Games with a known value: largest error of 100 random states")
-    game = closed_form_problem()
+    game = two_state_game()
     direct = DirectSolver(game, horizon=40.0, n_intervals=40, degree=6, grading=3.0)
     saddle = SaddleSolver(game, horizon=40.0)
     errors: dict[str, list[tuple[float, float]]] = {"direct (IPOPT)": [], "saddle point": []}

@@ -26,7 +26,7 @@ from stationkeep.comparison.theory.uub import Gains, Knowledge, constants, dista
 from stationkeep.offline import Pairs
 from stationkeep.online import Learner, LearnerSettings, draw_samples, rank_margin
 from stationkeep.online.rows import BellmanTerms, bellman_error
-from stationkeep.symbolic import Basis, ValueFunctions, closed_form_problem, quadratic
+from stationkeep.symbolic import Basis, ValueFunctions, quadratic, two_state_game
 
 POLICIES = ("learned", "quadratic", "gradient")
 
@@ -87,7 +87,7 @@ def show(row: Condition) -> None:
 
 def two_state() -> None:
     """Print the UUB claim where ε = 0: K as printed, and the level from which Z converges."""
-    problem, W = closed_form_problem(), np.array([0.5, 0.0, 1.0])
+    problem, W = two_state_game(), np.array([0.5, 0.0, 1.0])
     basis = Basis.build("quadratic", quadratic, problem.zeta, np.ones(2))
     functions, samples = ValueFunctions(problem, basis), draw_samples(np.ones(2), 100, 0)
     gains, ball = Gains(1.0, 3.0, 2.0), float(np.linalg.norm(W)) * (1.0 + 1.1 * 3.0)

@@ -9,31 +9,33 @@ from pathlib import Path
 import numpy as np
 
 from ..comparison import Scenario
-from ..symbolic import InputError, require_state
+from ..symbolic import InputError, Problem
 from ..symbolic.arrays import Array
 
 
 def initial_states(options: argparse.Namespace, scenario: Scenario) -> list[Array]:
     """Return the initial states of the command line, or the scenario's."""
-    states = [require_state(_parse(text)) for text in options.state or []]
+    problem = scenario.station_keeping().problem
+    states = [problem.require_state(_parse(text, problem)) for text in options.state or []]
     if options.states is not None:
-        states += read_states(options.states)
+        states += read_states(options.states, problem)
     return states or [scenario.initial_state]
 
 
-def _parse(text: str) -> list[float]:
+def _parse(text: str, problem: Problem) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise InputError(
-            f"--state {text}: give 12 numbers with commas between, "
-            "x,y,z,phi,theta,psi and their rates [m, rad, m/s, rad/s]"
+            f"--state {text}: give {problem.n_states} numbers with commas between, "
+            f"{','.join(problem.state_names)}"
         ) from None
 
 
-def read_states(path: Path) -> list[Array]:
-    """Return the rows of 12 numbers of a .npy or CSV file; raises InputError."""
-    needed = "give rows of 12 numbers, as .npy or with commas between"
+def read_states(path: Path, problem: Problem) -> list[Array]:
+    """Return the rows of a .npy or CSV file, one number for each state; raises InputError."""
+    n = problem.n_states
+    needed = f"give rows of {n} numbers, as .npy or with commas between"
     try:
         table = np.load(path, allow_pickle=False) if path.suffix == ".npy" else _read_csv(path)
     except FileNotFoundError:
@@ -44,12 +46,12 @@ def read_states(path: Path) -> list[Array]:
         raise InputError(f"'{path}' can't be read as states; {needed}") from None
     if table.ndim == 1:
         table = table[None, :]
-    if table.dtype.kind not in "fiu" or table.ndim != 2 or table.shape[1] != 12 or not len(table):
+    if table.dtype.kind not in "fiu" or table.ndim != 2 or table.shape[1] != n or not len(table):
         raise InputError(f"'{path}' holds an array of shape {table.shape}; {needed}")
     rows = []
     for i, row in enumerate(table):
         try:
-            rows.append(require_state(row))
+            rows.append(problem.require_state(row))
         except InputError as error:
             raise InputError(f"'{path}', row {i + 1}: {error}") from None
     return rows

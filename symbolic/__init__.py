@@ -3,20 +3,22 @@
 from .compiled import Export, Kernel
 from .errors import GammaTooSmallError, InputError, RunError, StationkeepError
 from .game import (
+    Bound,
     Game,
     InverseDynamics,
     Problem,
-    closed_form_problem,
     game_riccati,
     gamma_hamiltonian,
     gamma_star,
 )
-from .underwater import Model, StationKeeping, Thrusters, Vehicle, require_pitch, require_state
+from .textbook import two_state_game
+from .underwater import Model, StationKeeping, Thrusters, Vehicle, require_pitch, require_vehicle_state
 from .value import (
     Basis,
     Path,
     PointTerms,
     Prediction,
+    Setup,
     ValueFunctions,
     drag,
     drag_cubic,
@@ -27,6 +29,7 @@ from .value import (
 
 __all__ = [
     "Basis",
+    "Bound",
     "Export",
     "Game",
     "GammaTooSmallError",
@@ -39,12 +42,12 @@ __all__ = [
     "Prediction",
     "Problem",
     "RunError",
+    "Setup",
     "StationKeeping",
     "StationkeepError",
     "Thrusters",
     "ValueFunctions",
     "Vehicle",
-    "closed_form_problem",
     "drag",
     "drag_cubic",
     "find_function",
@@ -54,5 +57,6 @@ __all__ = [
     "growing_steps",
     "quadratic",
     "require_pitch",
-    "require_state",
+    "require_vehicle_state",
+    "two_state_game",
 ]

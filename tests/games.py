@@ -17,8 +17,8 @@ from stationkeep.symbolic import (
     Problem,
     ValueFunctions,
     Vehicle,
-    closed_form_problem,
     quadratic,
+    two_state_game,
 )
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ QUICK = ("samples.number=200", "basis.name=quadratic", "simulation.duration=2")
 @cache
 def two_state() -> tuple[Problem, Basis, ValueFunctions]:
     """The exact two-state game (R = 1, γ = 2) and its monomials, not scaled: W* = (1/2, 0, 1)."""
-    problem = closed_form_problem()
+    problem = two_state_game()
     basis = Basis.build("quadratic", quadratic, problem.zeta, np.ones(2))
     return problem, basis, ValueFunctions(problem, basis, compiled=False)
 

@@ -15,10 +15,11 @@ from stationkeep.symbolic import (
     Basis,
     InputError,
     Problem,
-    closed_form_problem,
     drag,
+    drag_cubic,
     find_function,
     quadratic,
+    two_state_game,
 )
 
 Array = NDArray[np.float64]
@@ -104,7 +105,7 @@ def test_quadratic_weights(basis: Basis, reference_scale: Array) -> None:
 
 def test_quadratic_weights_of_the_closed_form() -> None:
     """In the physical state the ideal weights on (ζ1^2, ζ1 ζ2, ζ2^2) are (1/2, 0, 1)."""
-    problem = closed_form_problem()
+    problem = two_state_game()
     basis = Basis.build("quadratic", quadratic, problem.zeta, np.ones(2))
     assert basis.quadratic_weights(problem.P) == pytest.approx([0.5, 0.0, 1.0], abs=1e-10)
 
@@ -241,10 +242,13 @@ def test_unknown_basis(
     assert all(word in text for word in words), text
 
 
-def test_drag_basis_needs_a_vehicle() -> None:
-    """It knows positions and velocities by their index."""
-    with pytest.raises(InputError, match="needs the 12 states"):
-        drag(SX.sym("x", 2))
+def test_drag_bases_need_positions_and_rates() -> None:
+    """They pair each position with its rate: 32 functions for two axes, none for an odd number."""
+    assert drag(casadi.SX.sym("x", 4)).shape == (10 + 22, 1)
+    with pytest.raises(InputError, match="positions and their rates"):
+        drag(casadi.SX.sym("x", 3))
+    with pytest.raises(InputError, match="translations, angles and their rates"):
+        drag_cubic(casadi.SX.sym("x", 6))
 
 
 def test_weights_that_do_not_exist(user_file: Path, reference_problem: Problem) -> None:

@@ -17,9 +17,9 @@ from stationkeep.symbolic import (
     Problem,
     ValueFunctions,
     Vehicle,
-    closed_form_problem,
     find_function,
     quadratic,
+    two_state_game,
 )
 from stationkeep.symbolic.compiled.compilation import find_compiler
 from stationkeep.symbolic.underwater import dynamics, kinematics
@@ -185,7 +185,7 @@ def test_sample_kernel_is_its_source(functions: ValueFunctions) -> None:
 
 def test_sample_layout_of_a_small_game() -> None:
     """The same layout for 2 states, 1 input and 3 functions, where shapes could be mistaken."""
-    problem = closed_form_problem()
+    problem = two_state_game()
     basis = Basis.build("quadratic", quadratic, problem.zeta, np.array([1.0, 1.0]))
     points = np.random.default_rng(0).uniform(-1.0, 1.0, (4, 2))
     for n_points in (1, 4):

@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stationkeep.symbolic import Game, GammaTooSmallError, Problem, closed_form_problem
+from stationkeep.symbolic import Game, GammaTooSmallError, Problem, two_state_game
 
 Array = NDArray[np.float64]
 
@@ -191,7 +191,7 @@ def test_with_gamma_names_gamma_star(
 @pytest.mark.parametrize(("R", "gamma"), [(1.0, 2.0), (0.3, 0.7), (5.0, 10.0), (1.0, np.inf)])
 def test_closed_form_game(R: float, gamma: float) -> None:
     """The residual of (7) is zero for V = ζ_1^2/2 + ζ_2^2, with the plant that errata.md defines."""
-    problem = closed_form_problem(R, gamma)
+    problem = two_state_game(R, gamma)
     terms = casadi.Function("terms", [problem.zeta], [problem.drift, problem.input_matrix])
     k = 1.0 / R - (0.0 if np.isinf(gamma) else gamma**-2)
     for x_1, x_2 in np.random.default_rng(0).uniform(-2.0, 2.0, (200, 2)):
@@ -211,4 +211,4 @@ def test_closed_form_game(R: float, gamma: float) -> None:
 @pytest.mark.parametrize(("R", "gamma"), [(1.0, 2.0), (0.3, 0.7), (5.0, 10.0)])
 def test_closed_form_riccati(R: float, gamma: float) -> None:
     """Its value is quadratic, so the Riccati solution is its Hessian half: diag(1/2, 1)."""
-    assert pytest.approx(np.diag([0.5, 1.0]), abs=1e-12) == closed_form_problem(R, gamma).P
+    assert pytest.approx(np.diag([0.5, 1.0]), abs=1e-12) == two_state_game(R, gamma).P

@@ -14,8 +14,7 @@ from stationkeep.symbolic import (
     Model,
     Problem,
     Vehicle,
-    closed_form_problem,
-    require_state,
+    two_state_game,
 )
 from stationkeep.symbolic.underwater import dynamics
 
@@ -95,7 +94,7 @@ def test_gamma_must_be_positive(gamma: float, one_sentence: Check) -> None:
 def test_closed_form_game_obeys_the_same_rules(R: float, gamma: float, one_sentence: Check) -> None:
     """R > 0 and gamma^2 > R > 0."""
     with pytest.raises(InputError) as caught:
-        closed_form_problem(R, gamma)
+        two_state_game(R, gamma)
     one_sentence(caught.value)
 
 
@@ -125,9 +124,10 @@ def test_states(function: str, state: Any, words: list[str], model: Model, one_s
 def test_states_that_are_allowed(model: Model) -> None:
     """A pitch of 89.9 degrees, any roll and yaw; lists; two states of a game that is no vehicle."""
     assert np.isfinite(model.drift([0, 0, 0, 9.0, np.radians(89.9), -9.0, 0, 0, 0, 0, 0, 0])).all()
-    assert require_state([1, 2], 2).tolist() == [1.0, 2.0]
-    with pytest.raises(InputError, match=r"2 numbers, but its shape is \(3,\)"):
-        require_state([1, 2, 3], 2)
+    game = two_state_game()
+    assert game.require_state([1, 2]).tolist() == [1.0, 2.0]
+    with pytest.raises(InputError, match=r"2 numbers \(x1,x2\), but its shape is \(3,\)"):
+        game.require_state([1, 2, 3])
 
 
 @pytest.mark.parametrize("current", [(1.0, 2.0), (np.nan, 0.0, 0.0), (0.0, np.inf, 0.0), 0.5, "fast"])

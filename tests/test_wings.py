@@ -1,8 +1,8 @@
 """The wings: who imports whom inside a folder, through which faces, and how much a folder holds.
 
 A wing is a folder with an `__init__`, its face, or a single module that stands beside the wings. A
-module may import those of its own wing, and the faces of what stands before its wing in `WINGS`; from another
-folder, that folder's face or one of its wings'.
+module may import those of its own wing, and the faces of what stands before its wing in `WINGS`; from
+another folder, that folder's face or one of its wings'.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 WINGS = {
     "symbolic": (
         *("arrays", "errors", "toml", "integration", "compiled"),
-        *("game", "value", "underwater"),
+        *("game", "value", "underwater", "textbook"),
     ),
     "online": ("laws", "rows", "learning", "vehicle", "records"),
     "offline": (

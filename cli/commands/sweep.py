@@ -107,20 +107,20 @@ def _plan(options: argparse.Namespace, scenario: Scenario) -> Plan:
         varied=tuple(parse_vary(text, scenario) for text in asked),
         n_points=options.samples or 0,
         sampling=options.sampling,
-        states=_states(options),
+        states=_states(options, scenario),
         seed=seed,
         kept=str(bench),
     )
 
 
-def _states(options: argparse.Namespace) -> Array | int:
+def _states(options: argparse.Namespace, scenario: Scenario) -> Array | int:
     text = options.states
     if text is None:
         return 0
     try:
         number = int(text)
     except ValueError:
-        return np.array(read_states(Path(text)))
+        return np.array(read_states(Path(text), scenario.station_keeping().problem))
     if number < 1:
         raise InputError(f"--states is {number}, but must be at least 1")
     return number

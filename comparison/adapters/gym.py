@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...online import build_disturbance
 from ...online.vehicle import HeldPlant, MeasurementNoise, PlantState
-from ...symbolic import InputError, RunError, require_state
+from ...symbolic import InputError, RunError
 from ...symbolic.arrays import Array
 from ..policies import LinearPolicy
 from ..scenario import DEFAULT, Scenario
@@ -103,7 +103,7 @@ class StationKeepingEnv(gymnasium.Env[Single, Single]):
         drawn = self.station.envelope * self.np_random.uniform(-1.0, 1.0, 12) * radius
         noise = {"seed": int(self.np_random.integers(2**31))}
         self._noise = MeasurementNoise(self.settings.noise.model_copy(update=noise))
-        start = require_state((options or {}).get("state", drawn))
+        start = self.station.problem.require_state((options or {}).get("state", drawn))
         self._state, self._steps = PlantState(start, 0.0, 0.0), 0
         return self._seen(), self._info("")
 

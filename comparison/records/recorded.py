@@ -12,7 +12,7 @@ from ...offline import OfflineSolver, Trajectory
 from ...online import load
 from ...online.records import read_parts
 from ...online.vehicle import Progress
-from ...symbolic import InputError, require_state
+from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ...symbolic.toml import validate
 from ..policies import CONTENDERS
@@ -98,18 +98,19 @@ def run_again(record: xr.Dataset, folder: Path, progress: Progress | None = None
         return online_record(scenario, policy=lambda: make(scenario), kind=kind, progress=tell)
     if kind == CLAIRVOYANT:
         return clairvoyant_or_failure(scenario, clairvoyant_provenance(scenario))
-    zeta0, key = _start(kind)
+    zeta0, key = _start(scenario, kind)
     guess = _guess(folder, key) if key else None
     solver = OfflineSolver(scenario.station_keeping().problem, scenario.offline)
     attributes = optimum_provenance(scenario, zeta0, key)
     return optimum_or_failure(scenario, solver, zeta0, attributes, guess)
 
 
-def _start(kind: str) -> tuple[Array, str]:
+def _start(scenario: Scenario, kind: str) -> tuple[Array, str]:
     """Return the initial state of an optimum, and the key of the record that it started from."""
     numbers, _, key = kind.removeprefix(OPTIMAL).partition(GUESSED)
     try:
-        return require_state(np.array(json.loads(numbers), dtype=float)), key
+        problem = scenario.station_keeping().problem
+        return problem.require_state(np.array(json.loads(numbers), dtype=float)), key
     except (ValueError, TypeError):
         raise InputError(f"the record's kind is '{kind}', but must name an initial state") from None
 

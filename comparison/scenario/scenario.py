@@ -23,7 +23,7 @@ from ...symbolic import (
     Vehicle,
     find_function,
     gamma_star,
-    require_state,
+    require_vehicle_state,
 )
 from ...symbolic.arrays import Array, Vector3
 from ...symbolic.game import weight_matrix
@@ -219,10 +219,16 @@ class Scenario(Settings):
         problem = self._problem(model, half_widths)
         _ = problem.P  # refuses a gamma without stabilising solution
         basis = Basis.build(self.basis.name, self.basis_function(), problem.zeta, half_widths)
-        return StationKeeping(model, problem, basis, half_widths, self.envelope.scale * half_widths)
+        return StationKeeping(
+            problem=problem,
+            basis=basis,
+            envelope=self.envelope.scale * half_widths,
+            compiled=model.compiled,
+            model=model,
+        )
 
     def _require_start(self) -> None:
-        state, simulation = require_state(self.simulation.initial_state), self.simulation
+        state, simulation = require_vehicle_state(self.simulation.initial_state), self.simulation
         far = np.abs(state) / np.array(self.envelope.half_widths)
         if far.max() > simulation.chi:
             name = STATE_NAMES[int(far.argmax())]

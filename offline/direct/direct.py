@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...symbolic import Problem, RunError, require_state
+from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..path import Grid, Plant, Trajectory, aligned_mesh, graded_mesh, reintegrate, sign_changes
 from ..settings import Method
@@ -120,7 +120,7 @@ class DirectSolver:
         RunError
             If the last method tried does not converge.
         """
-        zeta0 = require_state(zeta0, self.problem.n_states)
+        zeta0 = self.problem.require_state(zeta0)
         mesh = self.mesh if mesh is None else mesh
         degree = self.degree if degree is None else degree
         started = time.perf_counter()

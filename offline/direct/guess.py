@@ -13,6 +13,8 @@ from ...symbolic.arrays import Array
 from ...symbolic.compiled import BatchKernel, dense_function
 from ...symbolic.integration import runge_kutta_step
 
+MARGIN_LEFT = 0.2  # of a bound of the domain, of its margin at rest: 80 degrees of pitch
+
 
 class LinearStart:
     """Trajectories of ζ_dot = f + g v with v = -R_eff^-1 B'P ζ.
@@ -29,7 +31,7 @@ class LinearStart:
     def sample(self, zeta0: Array, times: Array) -> tuple[Array, Array, Array]:
         """Return states (N, n), v (N, k) and ζ_dot (N, n) at ascending times > 0.
 
-        Beyond a failure, and beyond pitches of 80 degrees, the state decays to rest.
+        Beyond a failure, and near the edge of the domain, the state decays to rest.
         """
         ends = np.append(0.0, times)
         spans = np.diff(ends)
@@ -37,8 +39,9 @@ class LinearStart:
         steps = np.repeat(spans / counts, counts)
         path = self._step.roll(zeta0, steps[:, None])[np.cumsum(counts)]
         lost = ~np.isfinite(path).all(axis=1) | (np.abs(path) > 20.0 * self._size(zeta0)).any(axis=1)
-        if self.problem.inverse_dynamics is not None and path.shape[1] == 12:
-            lost |= np.abs(path[:, 4]) > 1.4
+        if self.problem.domain:
+            (left,) = self._margins(np.nan_to_num(path))
+            lost |= (left < MARGIN_LEFT * self._margins_at_rest).any(axis=1)
         if lost.any():
             first = int(np.argmax(lost))
             path[first:] = zeta0 * np.exp(-times[first:, None])
@@ -48,6 +51,16 @@ class LinearStart:
 
     def _size(self, zeta0: Array) -> Array:
         return np.maximum(np.abs(zeta0), self.problem.scale)
+
+    @cached_property
+    def _margins(self) -> BatchKernel:
+        problem = self.problem
+        function = dense_function("margins", {"zeta": problem.zeta}, {"margins": problem.margins})
+        return BatchKernel(function, compiled=self._compiled)
+
+    @cached_property
+    def _margins_at_rest(self) -> Array:
+        return self._margins(np.zeros((1, self.problem.n_states)))[0]
 
     @cached_property
     def _rate(self) -> BatchKernel:

@@ -23,7 +23,7 @@ from itertools import chain
 import numpy as np
 from casadi import SX
 
-from ...symbolic import Basis, InputError, Problem, RunError, require_state
+from ...symbolic import Basis, InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import against_control
 from ..path import Trajectory, aligned_mesh, graded_mesh
@@ -131,7 +131,7 @@ class ScheduledWorstCase:
             has not as many weights as the basis.
         """
         started, disturber = time.perf_counter(), self._disturber
-        zeta0 = require_state(zeta0, self.problem.n_states)
+        zeta0 = self.problem.require_state(zeta0)
         given, needed = schedule.weights.shape[1], self.basis.n_basis
         if given != needed:
             raise InputError(f"the schedule has {given} weights, but the basis has {needed}")

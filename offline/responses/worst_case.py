@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from casadi import SX
 
-from ...symbolic import RunError, require_state
+from ...symbolic import RunError
 from ...symbolic.arrays import Array
 from ..direct import SecondOrder, against_control
 from ..path import Trajectory, graded_mesh
@@ -118,7 +118,7 @@ class WorstCaseSolver:
             If the state is not finite, of the wrong shape or pitched by 90 degrees.
         """
         started = time.perf_counter()
-        zeta0 = require_state(zeta0, self.problem.n_states)
+        zeta0 = self.problem.require_state(zeta0)
         reason = self.policy.excludes(self.problem.game.gamma)
         if reason is None:
             try:

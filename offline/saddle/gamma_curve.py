@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...symbolic import InputError, Problem, RunError, require_state
+from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ...symbolic.game import gamma_threshold
 from .saddle import SaddleSolution, SaddleSolver
@@ -113,7 +113,7 @@ class GammaCurveSolver:
         InputError
             If the state is not finite, of the wrong shape or pitched by 90 degrees.
         """
-        zeta0 = require_state(zeta0, self.problem.n_states)
+        zeta0 = self.problem.require_state(zeta0)
         undisturbed, start = self._point(self._undisturbed, zeta0, None)
         points = []
         for solver in reversed(self._solvers):

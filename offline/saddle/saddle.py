@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...symbolic import Problem, RunError, require_state
+from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..path import GaussRule, Plant, aligned_mesh, graded_mesh, interpolate, sign_changes
 from .boundary import BoundaryProblem, Unknowns
@@ -142,7 +142,7 @@ class SaddleSolver:
         RunError
             If continuation in the initial state needs steps below a thousandth.
         """
-        zeta0 = require_state(zeta0, self.problem.n_states)
+        zeta0 = self.problem.require_state(zeta0)
         mesh = self.mesh if mesh is None else mesh
         started, iterations = time.perf_counter(), 0
         unknowns = None

@@ -1,18 +1,20 @@
 """The zero-sum game (4)-(9): weights, Riccati equation, and the problem of a game on a plant."""
 
+from .domain import Bound, require_numbers
 from .game import Game, gamma_threshold, weight_matrix
-from .problem import InverseDynamics, Problem, closed_form_problem
+from .problem import InverseDynamics, Problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
 
 __all__ = [
+    "Bound",
     "Game",
     "InverseDynamics",
     "Problem",
-    "closed_form_problem",
     "game_riccati",
     "gamma_hamiltonian",
     "gamma_star",
     "gamma_threshold",
+    "require_numbers",
     "stabilising_solution",
     "weight_matrix",
 ]

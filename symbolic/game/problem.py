@@ -8,11 +8,12 @@ from functools import cached_property
 import casadi
 import numpy as np
 from casadi import DM, SX
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Array
 from ..errors import GammaTooSmallError, InputError
 from . import riccati
+from .domain import Bound, margins_and_shown, outside, require_numbers
 from .game import Game
 
 
@@ -32,39 +33,55 @@ class InverseDynamics:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """ζ_dot = f(ζ) + g(ζ) (u_1 + u_2) with f(0) = 0, and the game played on it.
+    """ζ_dot = f(ζ) + g_1(ζ) u_1 + g_2(ζ) u_2 with f(0) = 0, and the game played on it.
 
     Attributes
     ----------
     name : appears in messages and files
     zeta : (n,) symbol
     drift : (n,) expression f of `zeta`, the steady trim already taken out
-    input_matrix : (n, k) expression g of `zeta`
+    control_matrix : (n, k) expression g_1 of `zeta`
     game : the weights
     scale : (n,) half-widths of the envelope, the unit of the scaled state x = ζ / scale
+    disturbance_matrix : (n, k_2) expression g_2 of `zeta`; g_1 itself, as in the paper, if left out
+    state_names, state_units : of the n states; x1 ... and 1 if left out
+    input_names, input_units : of the k inputs; u1 ... and 1 if left out
+    domain : bounds outside of which the equations have no meaning
     switching : (s,) expressions of `zeta`; f is only C^1 where one of them changes sign
     inverse_dynamics : for ζ = (η, η_dot) with as many inputs as η has entries; None if there is none
 
     Raises
     ------
     InputError
-        If the shapes disagree, f(0) is not 0, the scale is not positive, or the inverse dynamics
-        contradict f and g.
+        If the shapes disagree, f(0) is not 0, the scale is not positive, the origin is not in the
+        domain, or the inverse dynamics contradict f and g.
     """
 
     name: str
     zeta: SX
     drift: SX
-    input_matrix: SX
+    control_matrix: SX
     game: Game
     scale: Array
+    disturbance_matrix: SX = None  # type: ignore[assignment]  # g_1 until it is known
+    state_names: tuple[str, ...] = ()
+    state_units: tuple[str, ...] = ()
+    input_names: tuple[str, ...] = ()
+    input_units: tuple[str, ...] = ()
+    domain: tuple[Bound, ...] = ()
     switching: SX = field(default_factory=lambda: SX(0, 1))
     inverse_dynamics: InverseDynamics | None = None
 
     def __post_init__(self) -> None:
         n, k = self.n_states, self.n_inputs
-        if self.drift.shape != (n, 1) or self.input_matrix.shape[0] != n:
+        if self.disturbance_matrix is None or _equal(self.disturbance_matrix, self.control_matrix):
+            object.__setattr__(self, "disturbance_matrix", self.control_matrix)
+        self._name("state", "x", n)
+        self._name("input", "u", k)
+        if self.drift.shape != (n, 1) or self.control_matrix.shape[0] != n:
             raise InputError(f"{self.name}: f must be ({n},) and g must have {n} rows")
+        if self.disturbance_matrix.shape[0] != n:
+            raise InputError(f"{self.name}: the disturbance matrix must have {n} rows")
         if self.game.Q.shape != (n, n) or self.game.R.shape != (k, k):
             raise InputError(
                 f"{self.name}: Q has {len(self.game.Q)} rows and R has {len(self.game.R)}, but {n} "
@@ -78,6 +95,7 @@ class Problem:
                 f"{self.name}: f(0) must be 0, but its largest entry is {residual:.3g}; "
                 "take the steady trim out first"
             )
+        self.require_state(np.zeros(n))
         if self.inverse_dynamics is not None:
             self._require_inverse(self.inverse_dynamics)
 
@@ -88,8 +106,57 @@ class Problem:
 
     @property
     def n_inputs(self) -> int:
-        """Number of inputs k of each player."""
-        return int(self.input_matrix.shape[1])
+        """Number of inputs k of the control."""
+        return int(self.control_matrix.shape[1])
+
+    @property
+    def same_inputs(self) -> bool:
+        """Whether both players enter through the same g, as in the paper."""
+        return self.disturbance_matrix is self.control_matrix
+
+    @property
+    def input_matrix(self) -> SX:
+        """g of both players, (n, k), where they share it.
+
+        Raises
+        ------
+        InputError
+            If control and disturbance enter apart: what asks for this needs g_1 = g_2.
+        """
+        if not self.same_inputs:
+            raise InputError(
+                f"{self.name}: control and disturbance enter through different matrices, which the "
+                "solvers and the learner do not cover; leave out the disturbance matrix, so that the "
+                "disturbance enters like the control"
+            )
+        return self.control_matrix
+
+    def require_state(self, zeta: ArrayLike) -> Array:
+        """Return `zeta` as an array of n finite numbers inside the domain.
+
+        Raises
+        ------
+        InputError
+            One sentence about what is wrong.
+        """
+        state = require_numbers(zeta, self.state_names)
+        fault = self.outside(state)
+        if fault is not None:
+            raise InputError(fault)
+        return state
+
+    def outside(self, zeta: Array) -> str | None:
+        """Return the sentence of a bound of the domain that ζ (n,) does not keep, or None."""
+        return outside(self.domain, self._domain, zeta) if self.domain else None
+
+    @property
+    def margins(self) -> SX:
+        """The margins of the domain as one column, (b,), all positive inside."""
+        return casadi.vertcat(*(bound.margin for bound in self.domain))
+
+    @cached_property
+    def _domain(self) -> casadi.Function:
+        return margins_and_shown(self.zeta, self.domain)
 
     @cached_property
     def linearization(self) -> tuple[Array, Array]:
@@ -143,11 +210,14 @@ class Problem:
     def linearized(self) -> Problem:
         """Return the linear-quadratic game at the origin; its value is ζ'P ζ exactly."""
         A, B = self.linearization
+        g = SX(DM(B))
         return replace(
             self,
             name=f"{self.name}, linearised",
             drift=DM(A) @ self.zeta,
-            input_matrix=SX(DM(B)),
+            control_matrix=g,
+            disturbance_matrix=g,
+            domain=(),
             switching=SX(0, 1),
             inverse_dynamics=self._linear_inverse(A, B),
         )
@@ -181,7 +251,7 @@ class Problem:
         residual = casadi.Function(
             "residual",
             [self.zeta, inverse.acceleration],
-            [self.drift + self.input_matrix @ inverse.v - wanted],
+            [self.drift + self.control_matrix @ inverse.v - wanted],
         )
         rng = np.random.default_rng(0)
         worst = 0.0
@@ -193,24 +263,22 @@ class Problem:
                 f"{self.name}: the inverse dynamics contradict f and g by {worst:.2g}; correct them"
             )
 
+    def _name(self, what: str, letter: str, number: int) -> None:
+        """Fill in names and units that were left out; raises InputError if there are too few."""
+        for kind, default in (("names", [f"{letter}{i + 1}" for i in range(number)]), ("units", ["1"])):
+            given = tuple(getattr(self, f"{what}_{kind}")) or tuple(default * number)[:number]
+            if len(given) != number:
+                raise InputError(
+                    f"{self.name}: there are {len(given)} {what} {kind}, but {number} {what}s; "
+                    "give one for each"
+                )
+            object.__setattr__(self, f"{what}_{kind}", given)
+
     def _at_origin(self, expression: SX) -> Array:
         value = casadi.Function("at_origin", [self.zeta], [expression])(np.zeros(self.n_states))
         return np.array(DM(value).full(), dtype=float)
 
 
-def closed_form_problem(R: float = 1.0, gamma: float = 2.0) -> Problem:
-    """Return the two-state game with the known value V* = ζ_1^2 / 2 + ζ_2^2.
-
-    c = cos(2 ζ_1) + 2, k = 1/R - 1/γ^2, Q = I, g = (0, c) and
-    f = (-ζ_1 + ζ_2, -ζ_1/2 - ζ_2/2 (1 - k c^2)). The residual of (7) is exactly zero, so the ideal
-    weights on (ζ_1^2, ζ_1 ζ_2, ζ_2^2) are (1/2, 0, 1) for any R > 0 and γ^2 > R (after Vamvoudakis
-    and Lewis 2010, with the disturbance in the same channel).
-    """
-    zeta = SX.sym("zeta", 2)
-    c = casadi.cos(2 * zeta[0]) + 2
-    game = Game(np.eye(2), np.array([R]), np.eye(1), gamma)
-    k = 1 / R - gamma**-2
-    drift = casadi.vertcat(-zeta[0] + zeta[1], -zeta[0] / 2 - zeta[1] / 2 * (1 - k * c**2))
-    return Problem(
-        "two-state game", zeta, drift, casadi.vertcat(SX(1, 1), c), game, np.array([2.0, 2.0])
-    )
+def _equal(a: SX, b: SX) -> bool:
+    """Return whether two matrices are the same expressions."""
+    return a is b or (a.shape == b.shape and bool(casadi.is_equal(a, b, 100)))

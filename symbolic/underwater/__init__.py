@@ -2,7 +2,7 @@
 
 from .dynamics import acceleration, earth_frame, inverse_dynamics
 from .kinematics import jacobian, jacobian_inverse
-from .model import STATE_NAMES, Model, require_pitch, require_state
+from .model import STATE_NAMES, Model, require_pitch, require_vehicle_state
 from .station import StationKeeping
 from .vehicle import Thrusters, Vehicle
 
@@ -18,5 +18,5 @@ __all__ = [
     "jacobian",
     "jacobian_inverse",
     "require_pitch",
-    "require_state",
+    "require_vehicle_state",
 ]

@@ -13,13 +13,20 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, Vector3
 from ..compiled import Export, Kernel, dense_function, export
 from ..errors import InputError
-from ..game import Game, InverseDynamics, Problem
+from ..game import Bound, Game, InverseDynamics, Problem, require_numbers
 from . import dynamics, kinematics
 from .vehicle import Vehicle
 
 STATE_NAMES = (
     *("x", "y", "z", "phi", "theta", "psi"),
     *("x_dot", "y_dot", "z_dot", "phi_dot", "theta_dot", "psi_dot"),
+)
+STATE_UNITS = (*("m",) * 3, *("rad",) * 3, *("m/s",) * 3, *("rad/s",) * 3)
+FORCE_NAMES = ("X", "Y", "Z", "K", "M", "N")
+FORCE_UNITS = (*("N",) * 3, *("N m",) * 3)
+PITCH_SENTENCE = (
+    "the pitch is {} deg, but must stay inside ±90 deg, where the Euler angles are singular "
+    "(Assumption 1); start closer to level"
 )
 PITCH_LIMIT = np.pi / 2  # rad; J is singular there (Assumption 1)
 
@@ -63,11 +70,11 @@ class Model:
         InputError
             If `zeta` is not 12 finite numbers or |pitch| >= 90 degrees.
         """
-        return self._drift(require_state(zeta))[0]
+        return self._drift(require_vehicle_state(zeta))[0]
 
     def input_matrix(self, zeta: ArrayLike) -> Array:
         """Return g(ζ) = (0, M_bar^-1) of (3), shape (12, 6); raises as `drift` does."""
-        return self._input_matrix(require_state(zeta))[0]
+        return self._input_matrix(require_vehicle_state(zeta))[0]
 
     @cached_property
     def u_trim(self) -> Array:
@@ -98,9 +105,14 @@ class Model:
             name=self.vehicle.name,
             zeta=self.zeta,
             drift=f,
-            input_matrix=g,
+            control_matrix=g,
             game=game,
             scale=scale,
+            state_names=STATE_NAMES,
+            state_units=STATE_UNITS,
+            input_names=FORCE_NAMES,
+            input_units=FORCE_UNITS,
+            domain=(pitch_bound(self.zeta),),
             switching=dynamics.relative_velocity(self.zeta, self.current),
             inverse_dynamics=InverseDynamics(a, v),
         )
@@ -181,32 +193,25 @@ class Model:
         return kernel
 
 
-def require_state(zeta: ArrayLike, n_states: int = 12) -> Array:
-    """Return `zeta` as an array of n finite numbers with the pitch inside ±90 degrees.
+def require_pitch(theta: float) -> None:
+    """Raise InputError unless the pitch [rad] is inside ±90 degrees."""
+    if abs(theta) >= PITCH_LIMIT:
+        raise InputError(PITCH_SENTENCE.format(f"{np.degrees(theta):.1f}"))
+
+
+def pitch_bound(zeta: SX) -> Bound:
+    """Return the bound of the pitch of a vehicle's state, (π/2)^2 - θ^2 > 0."""
+    return Bound(PITCH_LIMIT**2 - zeta[4] ** 2, PITCH_SENTENCE, 180.0 / np.pi * zeta[4])
+
+
+def require_vehicle_state(zeta: ArrayLike) -> Array:
+    """Return a vehicle's state as 12 finite numbers with the pitch inside ±90 degrees.
 
     Raises
     ------
     InputError
-        One sentence about what is wrong. The pitch is looked at when there are 12 states.
+        One sentence about what is wrong.
     """
-    try:
-        state = np.array(zeta, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"a state must be {n_states} numbers") from None
-    if state.shape != (n_states,):
-        order = " (x,y,z,phi,theta,psi and their rates)" if n_states == 12 else ""
-        raise InputError(f"a state must be {n_states} numbers{order}, but its shape is {state.shape}")
-    if not np.isfinite(state).all():
-        raise InputError("a state must be finite, but it contains NaN or infinity")
-    if n_states == 12:
-        require_pitch(float(state[4]))
+    state = require_numbers(zeta, STATE_NAMES)
+    require_pitch(float(state[4]))
     return state
-
-
-def require_pitch(theta: float) -> None:
-    """Raise InputError unless the pitch [rad] is inside ±90 degrees."""
-    if abs(theta) >= PITCH_LIMIT:
-        raise InputError(
-            f"the pitch is {np.degrees(theta):.1f} deg, but must stay inside ±90 deg, where the "
-            "Euler angles are singular (Assumption 1); start closer to level"
-        )

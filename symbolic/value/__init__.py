@@ -3,6 +3,7 @@
 from .basis import Basis, BasisFunction, drag, drag_cubic, find_function, quadratic
 from .functions import PointTerms, ValueFunctions
 from .prediction import BOUND, Path, Prediction, growing_steps
+from .setup import Setup
 
 __all__ = [
     "BOUND",
@@ -11,6 +12,7 @@ __all__ = [
     "Path",
     "PointTerms",
     "Prediction",
+    "Setup",
     "ValueFunctions",
     "drag",
     "drag_cubic",

@@ -37,15 +37,20 @@ def quadratic(x: SX) -> SX:
 
 
 def drag(x: SX) -> SX:
-    """Return the quadratic monomials and eleven drag-aware functions an axis, shape (144,).
+    """Return the quadratic monomials and eleven drag-aware functions an axis: 144 for 12 states.
 
-    With a = x_i, b = x_{i+6}: s = 1/sqrt(1 + (b/.3)^2) falls where drag dominates, and
-    h = sqrt(1 + (a/.3)^2) grows like |a|, since far away the way back is paid per metre.
+    For states (η, η_dot), k axes. With a = x_i, b = x_{i+k}: s = 1/sqrt(1 + (b/.3)^2) falls where drag
+    dominates, and h = sqrt(1 + (a/.3)^2) grows like |a|, since far away the way back is paid per metre.
+
+    Raises
+    ------
+    InputError
+        If the number of states is odd.
     """
-    _require_vehicle_state(x, "drag")
+    axes = _axes(x, "drag", 1)
     terms = [quadratic(x)]
-    for i in range(6):
-        a, b = x[i], x[i + 6]
+    for i in range(axes):
+        a, b = x[i], x[i + axes]
         s = 1 / casadi.sqrt(1 + (b / 0.3) ** 2)
         h = casadi.sqrt(1 + (a / 0.3) ** 2)
         terms += [a**2 * h, a**2 / h, a * b * s, a * b * h, a * b / h, b**2 * s, b**2 * s**2]
@@ -54,9 +59,19 @@ def drag(x: SX) -> SX:
 
 
 def drag_cubic(x: SX) -> SX:
-    """Return `drag` and the products translation x translation x attitude, shape (270,)."""
-    translation = [x[i] for i in (0, 1, 2, 6, 7, 8)]
-    attitude = [x[i] for i in (3, 4, 5, 9, 10, 11)]
+    """Return `drag` and the products translation x translation x attitude: 270 for 12 states.
+
+    Of states (η, η_dot) whose axes are translations in their first half and angles in the other.
+
+    Raises
+    ------
+    InputError
+        If the number of axes is odd.
+    """
+    axes = _axes(x, "drag-cubic", 2)
+    half = axes // 2
+    translation = [x[j + i] for j in (0, axes) for i in range(half)]
+    attitude = [x[j + i] for j in (half, axes + half) for i in range(half)]
     pairs = combinations_with_replacement(translation, 2)
     return casadi.vertcat(drag(x), *(a * b * c for a, b in pairs for c in attitude))
 
@@ -195,12 +210,16 @@ def find_function(name: str) -> BasisFunction:
     return function  # type: ignore[no-any-return]
 
 
-def _require_vehicle_state(x: SX, name: str) -> None:
-    if x.shape[0] != 12:
+def _axes(x: SX, name: str, multiple: int) -> int:
+    """Return the number of axes of states (η, η_dot), which has to be a multiple."""
+    axes, odd = divmod(x.shape[0], 2)
+    if odd or axes % multiple:
+        kind = "positions and their rates" if multiple == 1 else "translations, angles and their rates"
         raise InputError(
-            f"basis '{name}' needs the 12 states of a vehicle, but there are {x.shape[0]}; "
-            "use 'quadratic'"
+            f"basis '{name}' is for {kind}, {2 * multiple} states a group, but there are "
+            f"{x.shape[0]}; use 'quadratic'"
         )
+    return axes
 
 
 def _one_line(error: Exception) -> str:

@@ -27,7 +27,7 @@ from ..game import Problem
 from ..integration import runge_kutta_step
 from .basis import Basis
 
-BOUND = 4.0  # half-widths; a path that gets farther counts as lost, and its cost is infinite
+BOUND = 4.0  # half-widths; a path that gets farther, or out of the domain, counts as lost
 Exporter = Callable[[casadi.Function, int], Kernel]
 
 
@@ -135,6 +135,9 @@ class Prediction:
         parameters = [MX.sym(rates.name_in(i), *rates.size_in(i)) for i in range(1, rates.n_in())]
         moved = runge_kutta_step(lambda at: rates(at, *parameters), y, dt)
         inside = casadi.mmax(casadi.fabs(moved[:n] / DM(self.problem.scale))) < BOUND
+        if self.problem.domain:
+            margins = casadi.Function("margins", [self.problem.zeta], [self.problem.margins])
+            inside = casadi.logic_and(inside, casadi.mmin(margins(moved[:n])) > 0)
         return casadi.Function("step", [y, *parameters, dt], [casadi.if_else(inside, moved, y)])
 
     @cached_property
