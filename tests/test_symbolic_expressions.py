@@ -127,7 +127,9 @@ def test_every_operation_is_written_by_its_name(word: str) -> None:
     node = SX.unary(code, x) if OPERATIONS[word] == 1 else SX.binary(code, x, exponent)
     function = casadi.Function("one", [x, y], [node], ["x", "y"], ["out"])
     data = to_data(function)
-    assert data["instructions"][-1][0] == word
+    made = function.instruction_id(function.n_instructions() - 2) == code
+    assert made or word == "twice"  # CasADi 3.7 knows 2 * x only
+    assert data["instructions"][-1][0] == (word if made else "mul")
     assert to_data(rebuilt(function)) == data
     point = [OUTSIDE.get(word, 0.3), 0.7]
     value = float(function(*point))
