@@ -11,10 +11,11 @@ hover, f(0) = 0 and both players enter through a g that turns with the vehicle:
     f = (x_dot, z_dot, θ_dot, -g sin(θ), g (cos(θ) - 1), 0)
     g = [0; 0; 0; -sin(θ)/m, 0; cos(θ)/m, 0; 0, 1/I]
 
-It is the planar quadrotor of Tedrake, Underactuated Robotics (MIT), chapter 3, with the mass and the
-moment of inertia of a Crazyflie 2.0: Förster 2015, System identification of the Crazyflie 2.0 nano
-quadrocopter, ETH Zürich, m = 28 g and I_yy = 16.655602e-6 kg m^2. Left out: drag, and the rotors' lag
-and limits; optimal thrusts of the default game stay within 0.6 and 1.5 times that of hover.
+It is the planar quadrotor of Tedrake, Underactuated Robotics (MIT), chapter 3, with the parameters of
+a Crazyflie 2.0: m = 28 g, and I_yy = 16.655602e-6 kg m^2 as identified by Förster 2015, System
+identification of the Crazyflie 2.0 nano quadrocopter, ETH Zürich. Left out: drag, and the rotors' lag
+and limits. Optimal thrusts of the default game are mostly 0.6 to 1.5 times that of hover, but from
+corners of the envelope they would have to be negative, or more than twice it.
 
 There are no inverse dynamics. What linear policies don't know is that the thrust turns: tilted it
 carries less, and how hard it pushes sideways depends on how much it carries.
@@ -31,7 +32,7 @@ from ..game import Game
 from ..problem import Problem
 
 GRAVITY = 9.81  # m/s^2
-MASS = 0.028  # kg; Förster 2015
+MASS = 0.028  # kg
 INERTIA = 16.655602e-6  # kg m^2, about the pitch axis; Förster 2015
 STATE_NAMES = ("x", "z", "theta", "x_dot", "z_dot", "theta_dot")
 STATE_UNITS = ("m", "m", "rad", "m/s", "m/s", "rad/s")
