@@ -52,6 +52,12 @@ def find_callable(text: str, what: str) -> Callable[..., Any]:
     return found  # type: ignore[no-any-return]
 
 
+def file_content(text: str) -> str:
+    """Return what is in the file of 'path/to/file.py:name', hexadecimal; '' where there is none."""
+    path = Path(text.rpartition(":")[0]).expanduser()
+    return path.read_bytes().hex() if path.is_file() else ""
+
+
 def one_line(error: Exception) -> str:
     """Return an exception's name and message in one line."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -120,7 +120,7 @@ def _states(options: argparse.Namespace, scenario: Scenario) -> Array | int:
     try:
         number = int(text)
     except ValueError:
-        return np.array(read_states(Path(text), scenario.station_keeping().problem))
+        return np.array(read_states(Path(text), scenario.setup().problem))
     if number < 1:
         raise InputError(f"--states is {number}, but must be at least 1")
     return number

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ...offline import DirectSolution, DirectSolver
-from ...symbolic import StationKeeping, Vehicle
+from ...symbolic import Setup, StationKeeping, Vehicle
 from ...symbolic.arrays import Array
 
 
@@ -40,49 +40,56 @@ class RunMetrics:
     cost: float | None
     running_cost: float | None
     regret: float | None
-    position_rms: float | None
-    excursion: float | None
-    effort: float
-    energy: float | None
-    saturated: float | None
     policy_microseconds: float
     policy_mean: float
     rest_share: float | None
-    peak_thrust: float | None
     stopped: str | None
+    position_rms: float | None = None
+    excursion: float | None = None
+    effort: float | None = None
+    energy: float | None = None
+    saturated: float | None = None
+    peak_thrust: float | None = None
 
 
-def run_metrics(record: xr.Dataset, station: StationKeeping, optimum: float | None) -> RunMetrics:
+def run_metrics(record: xr.Dataset, station: Setup, optimum: float | None) -> RunMetrics:
     """Return the figures of merit of a closed-loop record against V* = `optimum`.
 
     In `game` mode u_2 is what the run's own disturbance player did.
     """
     stopped = str(record.attrs["stopped"]) or None
-    zeta, time = record["zeta"].values, record["time"].values
+    zeta = record["zeta"].values
     cost = running_cost = rest_share = None
     if stopped is None:
         rest = float(zeta[-1] @ station.problem.P @ zeta[-1])
         running_cost = float(cost_to_date(record)[-1])
         cost = running_cost + rest
         rest_share = rest / cost if cost > 0.0 else 0.0
-    tau_b = record["tau_b"].values
-    distance = np.linalg.norm(zeta[:, :3], axis=1)
-    saturated = record.attrs.get("saturated")
     return RunMetrics(
         cost=cost,
         running_cost=running_cost,
         regret=None if cost is None or optimum is None else (cost - optimum) / optimum,
-        position_rms=float(np.sqrt(np.mean(distance**2))) if len(time) else None,
-        excursion=float(distance.max()) if len(time) else None,
-        effort=float(np.trapezoid(np.sum(tau_b[:, :3] ** 2, axis=1), time)),
-        energy=energy(record, station.model.vehicle),
-        saturated=None if saturated is None else float(saturated),
         policy_microseconds=float(record.attrs["policy_microseconds"]),
         policy_mean=float(record.attrs["policy_microseconds_mean"]),
         rest_share=rest_share,
-        peak_thrust=peak_thrust(tau_b, station.model.vehicle),
         stopped=stopped,
+        **(_vehicle_metrics(record, station) if isinstance(station, StationKeeping) else {}),
     )
+
+
+def _vehicle_metrics(record: xr.Dataset, station: StationKeeping) -> dict[str, Any]:
+    """Return what only a vehicle's run has."""
+    zeta, time, tau_b = (record[name].values for name in ("zeta", "time", "tau_b"))
+    distance = np.linalg.norm(zeta[:, :3], axis=1)
+    saturated = record.attrs.get("saturated")
+    return {
+        "position_rms": float(np.sqrt(np.mean(distance**2))) if len(time) else None,
+        "excursion": float(distance.max()) if len(time) else None,
+        "effort": float(np.trapezoid(np.sum(tau_b[:, :3] ** 2, axis=1), time)),
+        "energy": energy(record, station.model.vehicle),
+        "saturated": None if saturated is None else float(saturated),
+        "peak_thrust": peak_thrust(tau_b, station.model.vehicle),
+    }
 
 
 def cost_to_date(record: xr.Dataset) -> Array:
@@ -147,7 +154,7 @@ def dissipation_margin(record: xr.Dataset, V_start: float, V_end: float) -> floa
 class GameValue:
     """V* of a game at any state by one structured Newton solve, to about 1e-6 of itself."""
 
-    def __init__(self, station: StationKeeping) -> None:
+    def __init__(self, station: Setup) -> None:
         self._solver = DirectSolver(
             station.problem, horizon=60.0, n_intervals=16, degree=6, grading=6.0
         )

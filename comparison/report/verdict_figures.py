@@ -127,7 +127,7 @@ def draw_energy(page: Page, comparison: Comparison) -> None:
 
 
 def _needed(run: RunMetrics, electrical: bool) -> float:
-    return float(run.energy) if electrical and run.energy is not None else run.effort
+    return float((run.energy if electrical else None) or run.effort or 0.0)
 
 
 def _above(comparison: Comparison) -> tuple[dict[str, tuple[Array, Array]], str]:

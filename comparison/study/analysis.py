@@ -142,7 +142,7 @@ def _along(station: StationKeeping, learned: xr.Dataset, value: GameValue) -> xr
     last = int(over[-1]) if len(over) else len(time) - 1
     chosen = np.unique(np.linspace(0, last, N_ALONG).astype(int))
     critic = weights_in_use(learned, "critic", time[chosen])
-    linear = LinearPolicy(station)
+    linear = LinearPolicy(station.problem)
     columns: dict[str, list[float]] = {name: [] for name in _ALONG}
     for i, weights in zip(chosen, critic, strict=True):
         try:

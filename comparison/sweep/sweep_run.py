@@ -12,9 +12,8 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
-from ...symbolic import RunError, StationkeepError, StationKeeping
+from ...symbolic import RunError, Setup, StationkeepError
 from ...symbolic.arrays import Array
-from ...symbolic.underwater import STATE_NAMES
 from ..merit import GameValue, dissipation_margin, run_metrics
 from ..parallel import Work
 from ..records import contender_record
@@ -23,7 +22,7 @@ from .sweep_plan import Run
 
 Records = Literal["all", "failed", "none"]
 LEARNING = 10  # the weights are kept that much more rarely than the motion
-N_STATIONS = 4  # built ones that a worker remembers
+N_SETUPS = 4  # built ones that a worker remembers
 # what a setting can make of a run; anything else is a fault of the program
 FAULTS = (StationkeepError, ArithmeticError, ValueError, RuntimeError, MemoryError)
 FIGURES: dict[str, str] = {
@@ -83,11 +82,11 @@ class Finished:
 
 def worker(bench: Bench) -> Work[Run, Finished]:
     """Return what makes a run, for `pool.run_tasks`."""
-    stations = _Stations()
+    setups = _Setups()
 
     def work(run: Run) -> Iterator[Finished]:
         with np.errstate(all="ignore"):  # a run that diverges says so in its row
-            finished = _finished(bench, stations, run)
+            finished = _finished(bench, setups, run)
         yield finished
 
     return work
@@ -95,38 +94,39 @@ def worker(bench: Bench) -> Work[Run, Finished]:
 
 def lost_row(run: Run, scenario: Scenario, reason: str) -> dict[str, Any]:
     """Return the row of a run that gave no figures, and why."""
-    zeta = scenario.simulation.initial_state if run.zeta is None else run.zeta
-    states = {f"initial_{name}": value for name, value in zip(STATE_NAMES, zeta, strict=True)}
+    zeta = scenario.initial_state.tolist() if run.zeta is None else run.zeta
+    names = scenario.setup().problem.state_names
+    states = {f"initial_{name}": value for name, value in zip(names, zeta, strict=True)}
     head = {"run": run.number, "policy": run.policy, "state": run.state}
     row: dict[str, Any] = head | run.settings | states
     return row | dict.fromkeys(FIGURES) | {"failed": True, "reason": reason}
 
 
-class _Stations:
-    """The last stations that were built, each with the values that were found."""
+class _Setups:
+    """The last setups that were built, each with the values that were found."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[str, tuple[StationKeeping, _Values]] = OrderedDict()
+        self._known: OrderedDict[str, tuple[Setup, _Values]] = OrderedDict()
 
-    def of(self, scenario: Scenario) -> tuple[StationKeeping, _Values]:
-        """Return the scenario's station, built once, and give it to the scenario."""
-        text = scenario.station_text()
+    def of(self, scenario: Scenario) -> tuple[Setup, _Values]:
+        """Return the scenario's setup, built once, and give it to the scenario."""
+        text = scenario.setup_text()
         if text not in self._known:
-            station = scenario.station_keeping()
-            self._known[text] = station, _Values(station)
-            if len(self._known) > N_STATIONS:
+            setup = scenario.setup()
+            self._known[text] = setup, _Values(setup)
+            if len(self._known) > N_SETUPS:
                 self._known.popitem(last=False)
         self._known.move_to_end(text)
-        station, values = self._known[text]
-        scenario.use_station(station)
-        return station, values
+        setup, values = self._known[text]
+        scenario.use_setup(setup)
+        return setup, values
 
 
 class _Values:
     """V* at states; the last one is remembered, since every policy starts there."""
 
-    def __init__(self, station: StationKeeping) -> None:
-        self._value = GameValue(station)
+    def __init__(self, setup: Setup) -> None:
+        self._value = GameValue(setup)
         self._last: tuple[bytes, float] | None = None
 
     def at(self, zeta: Array) -> float:
@@ -136,15 +136,15 @@ class _Values:
         return self._last[1]
 
 
-def _finished(bench: Bench, stations: _Stations, run: Run) -> Finished:
+def _finished(bench: Bench, setups: _Setups, run: Run) -> Finished:
     started = time.perf_counter()
     row, record = lost_row(run, bench.scenario, ""), None
     try:
         scenario = run.scenario(bench.scenario)
         row |= lost_row(run, scenario, "")
-        station, values = stations.of(scenario)
+        setup, values = setups.of(scenario)
         record = contender_record(scenario, run.policy)
-        row |= _figures(record, station, values)
+        row |= _figures(record, setup, values)
     except FAULTS as error:
         row["reason"] = " ".join(str(error).split()) or type(error).__name__
     row["failed"] = bool(row["reason"])
@@ -157,7 +157,7 @@ def _finished(bench: Bench, stations: _Stations, run: Run) -> Finished:
     return Finished(run, row, bytes(small.to_netcdf(engine="h5netcdf")))
 
 
-def _figures(record: xr.Dataset, station: StationKeeping, values: _Values) -> dict[str, Any]:
+def _figures(record: xr.Dataset, setup: Setup, values: _Values) -> dict[str, Any]:
     zeta, fallback = record["zeta"].values, record["fallback"].values
     time_axis = record["time"].values
     row: dict[str, Any] = {"reason": str(record.attrs["stopped"])}
@@ -167,7 +167,7 @@ def _figures(record: xr.Dataset, station: StationKeeping, values: _Values) -> di
             row["optimum"] = values.at(zeta[0])
         except RunError as error:
             row["reason"] = row["reason"] or f"the optimum is not known: {error}"
-    found = vars(run_metrics(record, station, row.get("optimum")))
+    found = vars(run_metrics(record, setup, row.get("optimum")))
     row |= {name: found[name] for name in FIGURES if name in found}
     row["fallback"] = float(fallback.mean()) if len(fallback) else None
     row["ended"] = float(time_axis[-1]) if len(time_axis) else None

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ...online import Learner, draw_samples, rank_margin
+from ...online.loop import fixed_points
 from ...online.rows import regressor_spectrum
-from ...online.vehicle import fixed_points
 from ...symbolic import StationKeeping
 from ...symbolic.arrays import Array
 from ..optima import Bounds

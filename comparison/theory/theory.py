@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from ...offline.ideal_weights import basis_at
-from ...online.vehicle import fixed_points
+from ...online.loop import fixed_points
 from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ..optima import Ideal

@@ -3,8 +3,8 @@
 from .domain import Bound, require_numbers
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import InverseDynamics, Problem
-from .stored import problem_from_data, problem_to_data
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
+from .stored import problem_from_data, problem_to_data
 
 __all__ = [
     "Bound",

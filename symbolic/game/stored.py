@@ -35,9 +35,7 @@ def problem_to_data(problem: Problem) -> dict[str, Any]:
     inputs = {"zeta": problem.zeta}
     if inverse is not None:
         inputs["acceleration"], parts["inverse"] = inverse.acceleration, inverse.v
-    equations = casadi.Function(
-        "equations", [*inputs.values()], [*parts.values()], [*inputs], [*parts]
-    )
+    equations = casadi.Function("equations", [*inputs.values()], [*parts.values()], [*inputs], [*parts])
     weights = {name: getattr(game, name).tolist() for name in ("Q", "R", "W_d")}
     return {
         "name": problem.name,
@@ -78,7 +76,7 @@ def problem_from_data(data: Mapping[str, Any]) -> Problem:
             drift=parts["drift"],
             control_matrix=parts["control_matrix"],
             disturbance_matrix=parts.get("disturbance_matrix", parts["control_matrix"]),
-            game=Game(*(_matrix(weights[name]) for name in ("Q", "R", "W_d")), gamma),
+            game=Game(**{name: _matrix(weights[name]) for name in ("Q", "R", "W_d")}, gamma=gamma),
             scale=_matrix(data["scale"]),
             domain=domain,
             switching=parts["switching"],

@@ -72,8 +72,8 @@ def quadrotor(mass: float = MASS, inertia: float = INERTIA, gamma: float = 2.0) 
     game = Game(np.array(BRYSON) ** -2.0, R, R, gamma)
     upright = Bound(
         (np.pi / 2) ** 2 - theta**2,
-        "the angle theta is {} deg, but must stay inside ±90 deg, where the thrust no longer carries the "
-        "weight; start closer to level",
+        "the angle theta is {} deg, but must stay inside ±90 deg, where the thrust no longer carries "
+        "the weight; start closer to level",
         180.0 / np.pi * theta,
     )
     return Problem(
