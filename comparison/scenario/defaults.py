@@ -27,6 +27,7 @@ def problem_defaults(problem: Problem) -> dict[str, dict[str, Any]]:
     tau = DECAY / problem.decay_rate
     fastest = float(np.abs(problem.closed_loop_modes).max())
     period = _rounded(HELD / fastest)
+    learning = period * max(round(shipped.period * tau / period), 1)
     horizon = _rounded(shipped.horizon * tau)
     longest = 5.0 / 3.0 * horizon * fastest / STABLE  # steps whose last is 5/3 of their mean
     return {
@@ -34,11 +35,11 @@ def problem_defaults(problem: Problem) -> dict[str, dict[str, Any]]:
         "learner": {
             "horizon": horizon,
             "steps": int(np.clip(math.ceil(longest), shipped.steps, 2000)),
-            "period": period * max(round(shipped.period * tau / period), 1),
+            "period": learning,
             "gain_critic": _rounded(shipped.gain_critic / tau),
             "gain_actor_1": _rounded(shipped.gain_actor_1 / tau),
             "gain_actor_2": _rounded(shipped.gain_actor_2 / tau),
-            "forgetting": _rounded(shipped.forgetting / tau),
+            "forgetting": min(_rounded(shipped.forgetting / tau), 0.99 / learning),
         },
         "simulation": {
             "duration": period * math.ceil(loop.duration * tau / period),
