@@ -14,9 +14,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+import h5py  # type: ignore[import-untyped]
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 Values = npt.NDArray[Any]
 Name = tuple[str, ...]
@@ -33,6 +33,8 @@ EXCLUDED = (
     *("record", "table", "csv", "figures", "report", "animation"),
 )
 KINDS = {".nc": "netCDF", ".csv": "CSV", ".json": "JSON"}
+NUMERIC = "fiub"  # kinds of numpy's types
+DIMENSION = b"This is a netCDF dimension but not a netCDF variable"
 WORDS = {"": np.nan, "True": 1.0, "False": 0.0}  # cells of a table
 
 
@@ -120,10 +122,14 @@ def read(path: Path, label: str) -> Numbers:
 
 def _record(path: Path) -> Iterator[tuple[Name, Values]]:
     """Yield variables and attributes as they are stored."""
-    with xr.open_dataset(path, engine="h5netcdf", decode_cf=False) as dataset:
-        found: Numbers = {(str(n),): variable.values for n, variable in dataset.variables.items()}
-        found |= {("attributes", str(n)): np.asarray(value) for n, value in dataset.attrs.items()}
-    yield from ((name, values) for name, values in found.items() if values.dtype.kind in "fiub")
+    with h5py.File(path) as file:
+        for name, variable in file.items():
+            only_dimension = variable.attrs.get("NAME", b"").startswith(DIMENSION)
+            if variable.dtype.kind in NUMERIC and not only_dimension:
+                yield (name,), np.asarray(variable)
+        for name, value in file.attrs.items():
+            if np.asarray(value).dtype.kind in NUMERIC and not name.startswith("_"):  # netCDF's own
+                yield ("attributes", name), np.asarray(value)
 
 
 def _table(path: Path) -> Iterator[tuple[Name, Values]]:
