@@ -9,7 +9,7 @@ from casadi import SX
 from hypothesis import given
 from hypothesis import strategies as st
 from stationkeep.offline import Plant, Trajectory
-from stationkeep.offline.path import RadauRule, aligned_mesh, graded_mesh, sign_changes
+from stationkeep.offline.path import RadauRule, aligned_mesh, graded_mesh, settle, sign_changes
 from stationkeep.symbolic import Game, Problem
 
 from .games import Array, two_state
@@ -158,3 +158,42 @@ def test_smooth_plant_has_no_switches() -> None:
     path = path_of([np.sin, np.cos, np.ones_like], mesh)
     assert sign_changes(Plant(problem), path).shape == (0,)
     assert casadi.SX(problem.switching).shape[0] == 0
+
+
+def test_mesh_settles_on_an_event_that_moves_with_the_mesh() -> None:
+    """A solution whose crossing is a thousand times nearer to t = 0.7 after every solve."""
+    mesh, constant = np.linspace(0.0, 2.0, 5), np.ones_like
+    meshes: list[Array] = []
+
+    def crossing(k: int) -> float:
+        return 0.7 + 0.1 * 0.001**k
+
+    def solve_on(points: Array, before: Trajectory | None) -> Trajectory:
+        meshes.append(points)
+        root = crossing(len(meshes) - 1)
+        return path_of([lambda t: t - root, constant, constant], points)
+
+    solutions, events = settle(oscillators(), mesh, solve_on(mesh, None), lambda path: path, solve_on)
+    # the fourth solution has its crossing within 1e-6 of the mesh point that the third gave it
+    assert len(solutions) == len(meshes) == 4
+    np.testing.assert_allclose(events, [crossing(2)], atol=1e-10)
+    for k, points in enumerate(meshes[1:]):
+        np.testing.assert_allclose(points, [0.0, 0.5, crossing(k), 1.0, 1.5, 2.0], atol=1e-10)
+
+
+def test_mesh_that_does_not_settle_ends_after_its_rounds() -> None:
+    constant = np.ones_like
+
+    def solve_on(points: Array, before: Trajectory | None) -> Trajectory:
+        root = 0.9 if before is None or before.states[0, 0] > -0.8 else 0.6
+        return path_of([lambda t: t - root, constant, constant], points)
+
+    mesh = np.linspace(0.0, 2.0, 5)
+    first = solve_on(mesh, None)
+    solutions, events = settle(oscillators(), mesh, first, lambda path: path, solve_on, rounds=3)
+    assert len(solutions) == 4
+    np.testing.assert_allclose(events, [0.9], atol=1e-10)
+    fixed, _ = settle(
+        oscillators(), mesh, first, lambda path: path, solve_on, fixed=np.array([1.0]), rounds=1
+    )
+    np.testing.assert_allclose(fixed[-1].mesh, [0.0, 0.5, 0.9, 1.0, 1.5, 2.0], atol=1e-10)

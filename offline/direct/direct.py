@@ -14,7 +14,7 @@ import numpy as np
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
-from ..path import Grid, Plant, Trajectory, aligned_mesh, graded_mesh, reintegrate, sign_changes
+from ..path import Grid, Plant, Trajectory, graded_mesh, reintegrate, settle
 from ..settings import Method
 from .derivatives import PointDerivatives
 from .guess import LinearStart
@@ -155,26 +155,26 @@ class DirectSolver:
         changes, put mesh points on them, and repeat until they move by less than `tolerance` [s].
         Arguments and errors otherwise as of `solve`.
         """
+
+        def solve_on(mesh: Array, guess: Trajectory | None) -> DirectSolution:
+            return self.solve(zeta0, mesh=mesh, degree=degree, guess=guess, verify=False)
+
         base = self.mesh if mesh is None else mesh
-        solution = self.solve(zeta0, mesh=base, degree=degree, guess=guess, verify=False)
-        iterations, seconds = solution.iterations, solution.seconds
-        known = np.empty(0)
-        for _ in range(rounds):
-            events = sign_changes(self.plant, solution.trajectory)
-            if len(events) == len(known) and np.abs(events - known).max(initial=0.0) <= tolerance:
-                break
-            known = events
-            solution = self.solve(
-                zeta0,
-                mesh=aligned_mesh(base, events),
-                degree=degree,
-                guess=solution.trajectory,
-                verify=False,
-            )
-            iterations += solution.iterations
-            seconds += solution.seconds
-        solution = replace(solution, iterations=iterations, seconds=seconds)
-        return (self.verified(solution) if verify else solution), known
+        solutions, events = settle(
+            self.plant,
+            base,
+            solve_on(base, guess),
+            lambda solution: solution.trajectory,
+            lambda mesh, solution: solve_on(mesh, solution.trajectory),
+            tolerance=tolerance,
+            rounds=rounds,
+        )
+        solution = replace(
+            solutions[-1],
+            iterations=sum(each.iterations for each in solutions),
+            seconds=sum(each.seconds for each in solutions),
+        )
+        return (self.verified(solution) if verify else solution), events
 
     def verified(self, solution: DirectSolution) -> DirectSolution:
         """Return the solution with its defect and its value by re-integration."""

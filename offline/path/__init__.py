@@ -6,6 +6,7 @@ from .interpolation import interpolate
 from .mesh import aligned_mesh, extended, graded_mesh, growing_mesh, halved
 from .plant import Plant, Policy
 from .radau import RadauRule, radau_rule
+from .settling import settle
 from .trajectory import Trajectory
 from .verification import reintegrate, sign_changes
 
@@ -28,5 +29,6 @@ __all__ = [
     "interpolate",
     "radau_rule",
     "reintegrate",
+    "settle",
     "sign_changes",
 ]

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
-from ..path import GaussRule, Plant, aligned_mesh, graded_mesh, interpolate, sign_changes
+from ..path import GaussRule, Plant, graded_mesh, interpolate, settle
 from .boundary import BoundaryProblem, Unknowns
 from .extremal_field import ExtremalField
 
@@ -166,18 +166,21 @@ class SaddleSolver:
         The sign changes are those of its own trajectory: solve, locate them, put mesh points on them,
         and repeat until they move by less than `tolerance` [s]. Raises as `solve`.
         """
-        solution = self.solve(zeta0, start=start)
-        iterations, seconds = solution.iterations, solution.seconds
-        known = np.empty(0)
-        for _ in range(rounds):
-            events = sign_changes(self.plant, solution)
-            if len(events) == len(known) and np.abs(events - known).max(initial=0.0) <= tolerance:
-                break
-            known = events
-            solution = self.solve(zeta0, mesh=aligned_mesh(self.mesh, events), start=solution)
-            iterations += solution.iterations
-            seconds += solution.seconds
-        return replace(solution, iterations=iterations, seconds=seconds), known
+        solutions, events = settle(
+            self.plant,
+            self.mesh,
+            self.solve(zeta0, start=start),
+            lambda solution: solution,
+            lambda mesh, solution: self.solve(zeta0, mesh=mesh, start=solution),
+            tolerance=tolerance,
+            rounds=rounds,
+        )
+        solution = replace(
+            solutions[-1],
+            iterations=sum(each.iterations for each in solutions),
+            seconds=sum(each.seconds for each in solutions),
+        )
+        return solution, events
 
     def _continued(self, zeta0: Array, mesh: Array) -> tuple[Unknowns, int]:
         """Follow the solution from rest to `zeta0`, in one step if it can be."""
