@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi
 import numpy as np
 import pytest
 from casadi import SX
 from hypothesis import given
 from hypothesis import strategies as st
-from stationkeep.offline import Plant, Trajectory
+from stationkeep.offline import DirectSolver, MeshSettings, Plant, Trajectory
 from stationkeep.offline.path import RadauRule, aligned_mesh, graded_mesh, settle, sign_changes
-from stationkeep.symbolic import Game, Problem
+from stationkeep.symbolic import Game, InputError, Problem
 
 from .games import Array, two_state
 
@@ -87,6 +89,50 @@ def test_events_at_or_beyond_the_ends_leave_them() -> None:
     np.testing.assert_array_equal(aligned_mesh(mesh, np.array([0.0, 2.0, 2.5])), mesh)
     np.testing.assert_array_equal(aligned_mesh(mesh, np.empty(0)), mesh)
     np.testing.assert_array_equal(aligned_mesh(mesh, np.array([1.0])), mesh)
+
+
+NAMED = ["direct", "certified", "saddle", "quick", "regret", "prediction"]
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_named_settings_give_their_mesh(name: str) -> None:
+    settings: MeshSettings = getattr(MeshSettings, name)
+    lengths = np.diff(settings.points)
+    assert len(lengths) == settings.n_intervals
+    assert settings.points[-1] == settings.horizon
+    ratio = np.exp(settings.grading * (1.0 - 1.0 / settings.n_intervals))
+    assert lengths[-1] / lengths[0] == pytest.approx(ratio, rel=1e-9)
+
+
+@pytest.mark.parametrize("grading", [0.0, 3.0, 6.0])
+def test_lengthened_settings_keep_the_first_intervals(grading: float) -> None:
+    short = MeshSettings(horizon=60.0, n_intervals=20, degree=5, grading=grading)
+    long = short.lengthened(150.0)
+    assert long.points[-1] == 150.0
+    assert long.degree == 5
+    first = np.diff(short.points)[0], np.diff(long.points)[0]
+    assert first[1] == pytest.approx(first[0], rel=0.1)
+    assert short.lengthened(60.0) == short
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"horizon": 0.0}, {"horizon": np.inf}, {"n_intervals": 0}, {"degree": 0}, {"grading": -1.0}],
+)
+def test_settings_that_are_no_mesh_are_refused(
+    change: dict[str, float], one_sentence: Callable[[BaseException], str]
+) -> None:
+    with pytest.raises(InputError) as refused:
+        DirectSolver(two_state()[0], **change)  # type: ignore[arg-type]
+    assert "mesh" in one_sentence(refused.value)
+
+
+def test_settings_and_keywords_are_one_mesh() -> None:
+    problem, _, _ = two_state()
+    settings = MeshSettings.direct.changed(horizon=12.0, n_intervals=9)
+    one, other = DirectSolver(problem, settings), DirectSolver(problem, horizon=12.0, n_intervals=9)
+    np.testing.assert_array_equal(one.mesh, other.mesh)
+    assert one.degree == other.degree == MeshSettings.direct.degree
 
 
 def oscillators() -> Plant:

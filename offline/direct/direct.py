@@ -9,12 +9,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Unpack
 
 import numpy as np
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
-from ..path import Grid, Plant, Trajectory, graded_mesh, reintegrate, settle
+from ..path import Grid, MeshChanges, MeshSettings, Plant, Trajectory, reintegrate, settle
 from ..settings import Method
 from .derivatives import PointDerivatives
 from .guess import LinearStart
@@ -69,28 +70,24 @@ class DirectSolver:
     Parameters
     ----------
     problem : the game on its plant
-    horizon : T [s]; after it the cost is ζ(T)'P ζ(T)
-    n_intervals : K
-    degree : d, Radau points an interval
-    grading : about the logarithm of the ratio of the last to the first interval
+    settings : of the mesh and its Radau points
     method : "newton" where the plant has inverse dynamics, otherwise and as a safety net IPOPT; or
         "ipopt" always
+    changes : single settings of the mesh
     """
 
     def __init__(
         self,
         problem: Problem,
+        settings: MeshSettings = MeshSettings.direct,
         *,
-        horizon: float = 120.0,
-        n_intervals: int = 40,
-        degree: int = 5,
-        grading: float = 5.0,
         method: Method = "newton",
+        **changes: Unpack[MeshChanges],
     ) -> None:
         self.problem = problem
-        self.degree = degree
         self.plant = Plant(problem)
-        self.mesh = graded_mesh(horizon, n_intervals, grading)
+        settings = settings.changed(**changes)
+        self.mesh, self.degree = settings.points, settings.degree
         usable = method == "newton" and problem.inverse_dynamics is not None
         self._newton = StructuredNewton(problem) if usable else None
         self._start = LinearStart(problem)
