@@ -24,7 +24,7 @@ WINGS = {
     ),
     "online": ("laws", "rows", "learning", "loop", "vehicle", "records", "simulate"),
     "offline": (
-        *("settings", "path", "direct", "saddle", "certificate", "solve"),
+        *("path", "settings", "direct", "saddle", "certificate", "solve"),
         *("responses", "ideal_weights"),
     ),
     "comparison": (

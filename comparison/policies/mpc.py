@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...offline import Trajectory
+from ...offline import MeshSettings, Trajectory
 from ...offline.direct import StructuredNewton
 from ...offline.path import Grid, graded_mesh
 from ...online.loop import Feedback
@@ -28,10 +28,10 @@ class PredictionSettings:
     max_iterations : Newton steps of one solve
     """
 
-    horizon: float = 3.0
-    intervals: int = 5
-    degree: int = 4
-    grading: float = 1.5
+    horizon: float = MeshSettings.prediction.horizon
+    intervals: int = MeshSettings.prediction.n_intervals
+    degree: int = MeshSettings.prediction.degree
+    grading: float = MeshSettings.prediction.grading
     period: float = 0.1
     tolerance: float = 1e-5
     max_iterations: int = 15
