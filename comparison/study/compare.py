@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
 from ...online import draw_samples, load
 from ...symbolic import RunError, StationKeeping
-from ..merit import GameValue, RunMetrics, dissipation_margin, distribution
+from ..merit import GameValue, Regret, RunMetrics, dissipation_margin
 from ..optima import Ideal
 from ..policies import CONTENDERS
 from ..records import KIND as CLAIRVOYANT
@@ -122,14 +121,14 @@ class Comparison:
         }
 
     @property
-    def regret(self) -> dict[str, dict[str, Any]] | None:
-        """For each policy median, p90, max and the number that diverged.
+    def regret(self) -> dict[str, Regret] | None:
+        """The distribution over the states for each policy, a run that ended early as infinite.
 
         None in `disturbed` mode without a clairvoyant optimum: the game's is no reference there.
         """
         if self.disturbed and (self.clairvoyant is None or not self.clairvoyant_optima[0].value):
             return None
-        return {name: distribution(regrets) for name, regrets in self.regrets.items()}
+        return {name: Regret.of(regrets) for name, regrets in self.regrets.items()}
 
     @property
     def too_short(self) -> list[str]:

@@ -103,37 +103,23 @@ def lost_row(run: Run, scenario: Scenario, reason: str) -> dict[str, Any]:
 
 
 class _Setups:
-    """The last setups that were built, each with the values that were found."""
+    """The last setups that were built, each with what finds V* there and remembers the last one."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[str, tuple[Setup, _Values]] = OrderedDict()
+        self._known: OrderedDict[str, tuple[Setup, GameValue]] = OrderedDict()
 
-    def of(self, scenario: Scenario) -> tuple[Setup, _Values]:
+    def of(self, scenario: Scenario) -> tuple[Setup, GameValue]:
         """Return the scenario's setup, built once, and give it to the scenario."""
         text = scenario.setup_text()
         if text not in self._known:
             setup = scenario.setup()
-            self._known[text] = setup, _Values(setup)
+            self._known[text] = setup, GameValue(setup)
             if len(self._known) > N_SETUPS:
                 self._known.popitem(last=False)
         self._known.move_to_end(text)
-        setup, values = self._known[text]
+        setup, value = self._known[text]
         scenario.use_setup(setup)
-        return setup, values
-
-
-class _Values:
-    """V* at states; the last one is remembered, since every policy starts there."""
-
-    def __init__(self, setup: Setup) -> None:
-        self._value = GameValue(setup)
-        self._last: tuple[bytes, float] | None = None
-
-    def at(self, zeta: Array) -> float:
-        """Return V*(ζ); raises RunError where the solver does not converge."""
-        if self._last is None or self._last[0] != zeta.tobytes():
-            self._last = zeta.tobytes(), self._value(zeta)
-        return self._last[1]
+        return setup, value
 
 
 def _finished(bench: Bench, setups: _Setups, run: Run) -> Finished:
@@ -142,9 +128,9 @@ def _finished(bench: Bench, setups: _Setups, run: Run) -> Finished:
     try:
         scenario = run.scenario(bench.scenario)
         row |= lost_row(run, scenario, "")
-        setup, values = setups.of(scenario)
+        setup, value = setups.of(scenario)
         record = contender_record(scenario, run.policy)
-        row |= _figures(record, setup, values)
+        row |= _figures(record, setup, value)
     except FAULTS as error:
         row["reason"] = " ".join(str(error).split()) or type(error).__name__
     row["failed"] = bool(row["reason"])
@@ -157,14 +143,14 @@ def _finished(bench: Bench, setups: _Setups, run: Run) -> Finished:
     return Finished(run, row, bytes(small.to_netcdf(engine="h5netcdf")))
 
 
-def _figures(record: xr.Dataset, setup: Setup, values: _Values) -> dict[str, Any]:
+def _figures(record: xr.Dataset, setup: Setup, value: GameValue) -> dict[str, Any]:
     zeta, fallback = record["zeta"].values, record["fallback"].values
     time_axis = record["time"].values
     row: dict[str, Any] = {"reason": str(record.attrs["stopped"])}
     disturbed = record.attrs["mode"] == "disturbed"
     if not disturbed and len(zeta):
         try:
-            row["optimum"] = values.at(zeta[0])
+            row["optimum"] = value(zeta[0])
         except RunError as error:
             row["reason"] = row["reason"] or f"the optimum is not known: {error}"
     found = vars(run_metrics(record, setup, row.get("optimum")))
@@ -173,9 +159,7 @@ def _figures(record: xr.Dataset, setup: Setup, values: _Values) -> dict[str, Any
     row["ended"] = float(time_axis[-1]) if len(time_axis) else None
     if disturbed and len(zeta) and not row["reason"]:
         try:
-            row["dissipation_margin"] = dissipation_margin(
-                record, values.at(zeta[0]), values.at(zeta[-1])
-            )
+            row["dissipation_margin"] = dissipation_margin(record, value(zeta[0]), value(zeta[-1]))
         except RunError as error:
             row["reason"] = f"the optimum is not known: {error}"
     return row
