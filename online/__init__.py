@@ -1,8 +1,9 @@
 """Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
 
 from .learning import Learner, LearnerSettings, LearnerStep, Look, Monitor, SampleSettings
+from .paper import rank_margin
 from .records import load, load_weights, save, to_dataset
-from .rows import draw_samples, rank_margin
+from .rows import draw_samples
 from .vehicle import (
     Allocation,
     Allocator,

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ...online import Learner, draw_samples, rank_margin
-from ...online.rows import regressor_spectrum
+from ...online.paper import regressor_spectrum
 from ...online.vehicle import fixed_points
 from ...symbolic import StationKeeping
 from ...symbolic.arrays import Array
