@@ -2,8 +2,9 @@
 
 from .learning import Learner, LearnerSettings, LearnerStep, Look, Monitor, SampleSettings
 from .loop import Feedback, FunctionPolicy, History, LearnedPolicy, Policy, RunSettings
+from .paper import rank_margin
 from .records import load, load_weights, save, to_dataset
-from .rows import draw_samples, rank_margin
+from .rows import draw_samples
 from .simulate import simulate
 from .vehicle import (
     Allocation,

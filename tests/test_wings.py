@@ -22,7 +22,7 @@ WINGS = {
         *("arrays", "errors", "toml", "pyfile", "expressions", "integration", "compiled"),
         *("game", "value", "underwater", "textbook"),
     ),
-    "online": ("laws", "rows", "learning", "loop", "vehicle", "records", "simulate"),
+    "online": ("paper", "laws", "rows", "learning", "loop", "vehicle", "records", "simulate"),
     "offline": (
         *("path", "settings", "direct", "saddle", "certificate", "solve"),
         *("responses", "ideal_weights"),

@@ -12,7 +12,7 @@ import xarray as xr
 
 from ...offline import Pairs, error_sizes, fit_weights
 from ...offline.ideal_weights import least_states
-from ...online.rows import BellmanTerms, bellman_error
+from ...online.paper import BellmanTerms, bellman_error
 from ...symbolic import InputError, RunError, StationKeeping
 from ...symbolic.arrays import Array
 from ...symbolic.errors import nearest

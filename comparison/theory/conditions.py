@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 
 from ...online import Learner, draw_samples, rank_margin
 from ...online.loop import fixed_points
-from ...online.rows import regressor_spectrum
+from ...online.paper import regressor_spectrum
 from ...symbolic import StationKeeping
 from ...symbolic.arrays import Array
 from ..optima import Bounds
