@@ -1,6 +1,7 @@
 """Runs and optima as records that are kept, and run again from what they hold alone."""
 
 from .clairvoyant import KIND, clairvoyant_record, optimum_name
+from .recorded import recorded_scenario
 from .replay import BIT_EQUAL, DIFFERENT, Replay, replay
 from .runs import (
     FORMAT,
@@ -34,6 +35,7 @@ __all__ = [
     "optimum_or_failure",
     "optimum_provenance",
     "provenance",
+    "recorded_scenario",
     "replay",
     "reused",
     "trajectory_of",

@@ -14,7 +14,7 @@ from ..optima import Ideal
 from ..policies import CONTENDERS
 from ..records import KIND as CLAIRVOYANT
 from ..scenario import Scenario
-from ..theory import Condition, Theory, check, run_conditions, theory
+from ..theory import Condition, Theory, run_conditions, scenario_conditions, theory
 from .analysis import Field, analysis_record, ideal_of
 from .compared_runs import OPTIMUM, POLICIES, Optimum, Tell, make_all, record_path
 from .excitation import ExcitationRun, excitation_runs
@@ -215,7 +215,7 @@ def _conditions(
     scenario: Scenario, learned: xr.Dataset, ideal: Ideal | None, watched: Theory | None
 ) -> list[Condition]:
     bounds = None if ideal is None else ideal.bounds
-    listed = check(scenario, bounds, float(learned["rank_margin"].min()))
+    listed = scenario_conditions(scenario, bounds, float(learned["rank_margin"].min()))
     return listed + run_conditions(scenario, learned, watched)
 
 
