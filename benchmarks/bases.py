@@ -35,7 +35,7 @@ from stationkeep.comparison.evidence.regret import Case, Summary, finished, game
 from stationkeep.comparison.merit import GameValue
 from stationkeep.comparison.optima import fit, ideal_record
 from stationkeep.comparison.optima.ideal import Fit
-from stationkeep.comparison.policies import LinearPolicy
+from stationkeep.comparison.policies import LinearPolicy, OnVehicle
 from stationkeep.offline import ErrorSize, OfflineSolver, Pairs
 from stationkeep.online import Controller, History, draw_samples, run, save
 from stationkeep.symbolic import RunError
@@ -88,7 +88,10 @@ def regret(scenario: Scenario, reference: Reference, go: Run) -> str:
 
 def linear_run(scenario: Scenario) -> History:
     """Return the run of the linear H-infinity policy."""
-    return run(scenario, LinearPolicy(scenario.station_keeping()))
+    return run(
+        scenario,
+        OnVehicle(LinearPolicy(scenario.station_keeping().problem), scenario.station_keeping()),
+    )
 
 
 def as_they_are(scenario: Scenario, found: Fit, reference: Reference, folder: Path) -> Run:

@@ -10,11 +10,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 from stationkeep.comparison import Scenario
+from stationkeep.comparison.policies import LinearPolicy, OnVehicle
 from stationkeep.symbolic import (
     Basis,
     Game,
     Model,
     Problem,
+    StationKeeping,
     ValueFunctions,
     Vehicle,
     quadratic,
@@ -74,3 +76,8 @@ def random_weights(seed: int, m: int) -> tuple[Array, Array, Array]:
     """Return seeded critic and actor weights, all different."""
     critic, actor_1, actor_2 = np.random.default_rng(seed).standard_normal((3, m))
     return critic, actor_1, actor_2
+
+
+def linear_on(station: StationKeeping) -> OnVehicle:
+    """Return the linear H-infinity policy of a vehicle's game, driving the vehicle."""
+    return OnVehicle(LinearPolicy(station.problem), station)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from stationkeep.comparison.evidence.adversary import FrozenPolicy, PlayedForce, WatchedController, play
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.offline import ControlPolicy, WorstCaseSolver, linear_policy
 
-from .games import quick_scenario
+from .games import linear_on, quick_scenario
 
 ZETA = np.array([0.5, -0.3, 0.2, 0.05, -0.05, 0.2, 0, 0, 0, 0, 0, 0])
 
@@ -24,7 +23,7 @@ def test_played_worst_case_costs_what_was_solved_for() -> None:
     for period in (0.08, 0.02):
         changes = (f"simulation.control_period={period}", "simulation.duration=30")
         scenario = quick_scenario(*changes).with_settings(simulation={"initial_state": tuple(ZETA)})
-        played = play(scenario, LinearPolicy(station), worst.path)
+        played = play(scenario, linear_on(station), worst.path)
         assert played.cost is not None
         errors.append(abs(played.cost / worst.cost - 1.0))
     assert errors[1] < 1e-3

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
-from stationkeep.comparison.policies import LQR, Baseline, LinearPolicy
+from stationkeep.comparison.policies import LQR, LinearPolicy, OnVehicle
 from stationkeep.comparison.policies.mpc import ModelPredictive, PredictionSettings
 from stationkeep.comparison.policies.pid import CascadedPID, CascadeSettings
 from stationkeep.offline import DirectSolver
-from stationkeep.online import run
-from stationkeep.symbolic import InputError, RunError
+from stationkeep.online import Feedback, run
+from stationkeep.symbolic import InputError, RunError, StationKeeping
 
-from .games import Array, quick_scenario
+from .games import Array, linear_on, quick_scenario
 
 NEAR = np.array([0.2, -0.1, 0.15, 0.05, -0.03, 0.1, 0.02, -0.03, 0.05, 0.01, 0.02, -0.02])
 CURRENT = (
@@ -24,8 +24,13 @@ CURRENT = (
 )
 
 
-def step(policy: Baseline, zeta: Array, dt: float = 0.02) -> Array:
-    return policy.step(zeta[:6], zeta[6:], dt)
+def step(policy: Feedback, zeta: Array, dt: float = 0.02) -> Array:
+    """Return the wrench of a policy on the quick scenario's vehicle."""
+    return OnVehicle(policy, quick_scenario().station_keeping()).step(zeta[:6], zeta[6:], dt)
+
+
+def made(kind: type[Feedback], station: StationKeeping) -> Feedback:
+    return CascadedPID(station) if kind is CascadedPID else kind(station.problem)
 
 
 def test_lqr_has_the_gain_of_scipys_riccati_equation() -> None:
@@ -33,16 +38,16 @@ def test_lqr_has_the_gain_of_scipys_riccati_equation() -> None:
     B = np.vstack([np.zeros((6, 6)), np.linalg.inv(station.model.vehicle.M)])
     A, R = station.problem.linearization[0], station.game.R
     expected = np.linalg.solve(R, B.T @ solve_continuous_are(A, B, station.game.Q, R))
-    policy = LQR(station)
+    policy = LQR(station.problem)
     np.testing.assert_allclose(policy.gain, expected, rtol=1e-6, atol=1e-8)
-    assert np.abs(policy.gain - LinearPolicy(station).gain).max() > 0.1
+    assert np.abs(policy.gain - LinearPolicy(station.problem).gain).max() > 0.1
 
 
 @pytest.mark.parametrize("kind", [LQR, LinearPolicy, CascadedPID])
-def test_the_answer_makes_the_cost_that_of_the_single_player(kind: type[Baseline]) -> None:
+def test_the_answer_makes_the_cost_that_of_the_single_player(kind: type[Feedback]) -> None:
     """u_1'R u_1 - γ^2 u_2'W_d u_2 = v'R_eff v with v = u_1 + u_2, from the definitions."""
     station = quick_scenario("game.W_d=[2, 3, 1.5, 20, 15, 12]").station_keeping()
-    policy, game = kind(station), station.game
+    policy, game = made(kind, station), station.game
     step(policy, NEAR)
     u_1, u_2 = policy.u_control, policy.u_disturbance
     R_eff = np.linalg.inv(np.linalg.inv(game.R) - np.linalg.inv(game.W_d) / game.gamma**2)
@@ -53,10 +58,12 @@ def test_the_answer_makes_the_cost_that_of_the_single_player(kind: type[Baseline
 
 
 @pytest.mark.parametrize("kind", [LQR, CascadedPID, ModelPredictive])
-def test_a_full_turn_of_yaw_changes_nothing(kind: type[Baseline]) -> None:
+def test_a_full_turn_of_yaw_changes_nothing(kind: type[Feedback]) -> None:
     station = quick_scenario().station_keeping()
     turned = NEAR + 2.0 * np.pi * np.eye(12)[5]
-    np.testing.assert_allclose(step(kind(station), turned), step(kind(station), NEAR), atol=1e-7)
+    np.testing.assert_allclose(
+        step(made(kind, station), turned), step(made(kind, station), NEAR), atol=1e-7
+    )
 
 
 def test_long_horizon_is_the_optimal_policy() -> None:
@@ -65,7 +72,7 @@ def test_long_horizon_is_the_optimal_policy() -> None:
     optimum = DirectSolver(station.problem, horizon=80.0, n_intervals=40, degree=5)
     expected = optimum.solve(NEAR, verify=False)
     settings = PredictionSettings(horizon=60.0, intervals=24, degree=6, grading=6.0)
-    policy = ModelPredictive(station, settings)
+    policy = ModelPredictive(station.problem, settings)
     step(policy, NEAR)
     np.testing.assert_allclose(policy.u_control, expected.u_control, rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(policy.u_disturbance, expected.u_disturbance, rtol=1e-4, atol=1e-5)
@@ -80,11 +87,11 @@ def test_longer_horizons_are_better_than_the_linear_policy() -> None:
     )
     regrets = []
     for policy in (
-        ModelPredictive(station, PredictionSettings(horizon=4.0)),
-        ModelPredictive(station, PredictionSettings(horizon=2.0)),
-        LinearPolicy(station),
+        ModelPredictive(station.problem, PredictionSettings(horizon=4.0)),
+        ModelPredictive(station.problem, PredictionSettings(horizon=2.0)),
+        LinearPolicy(station.problem),
     ):
-        history = run(scenario, policy)
+        history = run(scenario, OnVehicle(policy, station))
         rest = history.zeta[-1] @ station.problem.P @ history.zeta[-1]
         regrets.append((history.cost[-1] - history.attenuated[-1] + rest) / value - 1.0)
     assert 0.0 < regrets[0] < 0.5 * regrets[1] < 0.5 * regrets[2]
@@ -92,7 +99,7 @@ def test_longer_horizons_are_better_than_the_linear_policy() -> None:
 
 def test_failed_solves_are_counted_and_the_plan_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
     station = quick_scenario().station_keeping()
-    policy = ModelPredictive(station, PredictionSettings(horizon=0.5, period=0.1))
+    policy = ModelPredictive(station.problem, PredictionSettings(horizon=0.5, period=0.1))
     first = step(policy, NEAR, 0.1)
 
     def fail(*arguments: object, **settings: object) -> None:
@@ -102,9 +109,11 @@ def test_failed_solves_are_counted_and_the_plan_goes_on(monkeypatch: pytest.Monk
     for i in range(4):
         step(policy, NEAR, 0.1)
         assert policy.failures == i + 1
-        assert np.abs(policy.u_control - LinearPolicy(station).control(NEAR, 0.1)).max() > 1e-3
+        assert np.abs(policy.u_control - LinearPolicy(station.problem).control(NEAR, 0.1)).max() > 1e-3
     step(policy, NEAR, 0.1)  # the plan of 0.5 s has ended
-    np.testing.assert_allclose(policy.u_control, LinearPolicy(station).control(NEAR, 0.1), rtol=1e-9)
+    np.testing.assert_allclose(
+        policy.u_control, LinearPolicy(station.problem).control(NEAR, 0.1), rtol=1e-9
+    )
     assert (policy.solves, policy.failures) == (6, 5)
     assert np.all(np.isfinite(first))
 
@@ -134,10 +143,10 @@ def test_pid_has_no_steady_error_in_a_current_and_the_linear_policy_has() -> Non
     scenario = quick_scenario(*CURRENT, "simulation.duration=300")
     station = scenario.station_keeping()
     settings = CascadeSettings(integral=0.5)
-    held = run(scenario, CascadedPID(station, settings))
+    held = run(scenario, OnVehicle(CascadedPID(station, settings), station))
     assert held.stopped is None
     assert np.abs(held.zeta[-1]).max() < 1e-4
-    leaning = run(scenario, LinearPolicy(station))
+    leaning = run(scenario, linear_on(station))
     assert leaning.stopped is None
     assert leaning.zeta[-1][0] > 0.5
 

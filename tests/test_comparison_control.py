@@ -15,15 +15,16 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.adapters.control import to_control
-from stationkeep.comparison.policies import LinearPolicy
+from stationkeep.comparison.policies import OnVehicle
 from stationkeep.comparison.policies.pid import CascadedPID
 from stationkeep.online import Controller, build_disturbance, save
-from stationkeep.online.vehicle import HeldPlant, PlantState
+from stationkeep.online.loop import PlantState
+from stationkeep.online.vehicle import HeldPlant
 from stationkeep.symbolic import InputError
 
 from .commands import QUICK
 from .fossen import PARAMETERS, Body, jacobian
-from .games import Array, quick_scenario
+from .games import Array, linear_on, quick_scenario
 
 START = np.array([0.8, -0.5, 0.4, 0.1, -0.1, 0.6, 0.1, 0.05, -0.1, 0.1, -0.05, 0.1])
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
@@ -48,7 +49,10 @@ def test_names() -> None:
     assert plant.state_labels[:7] == ["x", "y", "z", "phi", "theta", "psi", "x_dot"]
     assert plant.output_labels == plant.state_labels
     assert plant.input_labels == ["tau_X", "tau_Y", "tau_Z", "tau_K", "tau_M", "tau_N"]
-    closed = to_control(scenario("bluerov2-heavy"), LinearPolicy(quick_scenario().station_keeping()))
+    closed = to_control(
+        scenario("bluerov2-heavy"),
+        linear_on(quick_scenario().station_keeping()),
+    )
     assert closed.input_labels[0] == "tau_d_X"
     assert closed.output_labels == [*plant.state_labels, *plant.input_labels]
 
@@ -99,7 +103,11 @@ def test_the_closed_loop_agrees_with_an_independent_model() -> None:
         return np.concatenate([zeta[6:], body.acceleration(zeta, pushed, current)])
 
     times = np.linspace(0.0, 5.0, 6)
-    found = simulated(to_control(game, LinearPolicy(station)), times, np.tile(PUSH[:, None], 6))
+    found = simulated(
+        to_control(game, linear_on(station)),
+        times,
+        np.tile(PUSH[:, None], 6),
+    )
     expected = solve_ivp(rates, (0.0, 5.0), START, t_eval=times, method="DOP853", **TIGHT).y
     np.testing.assert_allclose(found[:12], expected, rtol=0, atol=1e-8)
     np.testing.assert_allclose(found[12:, -1], wrench(expected[:, -1]), rtol=0, atol=1e-6)
@@ -112,7 +120,7 @@ def test_linearised_by_python_control_it_is_the_linear_game() -> None:
     plant = to_control(game).linearize(np.zeros(12), np.zeros(6), eps=1e-7)
     np.testing.assert_allclose(plant.A, A, atol=2e-5)
     np.testing.assert_allclose(plant.B, B, atol=1e-6)
-    policy = LinearPolicy(game.station_keeping())
+    policy = linear_on(game.station_keeping())
     closed = to_control(game, policy).linearize(np.zeros(12), np.zeros(6), eps=1e-7)
     found, expected = (
         np.sort_complex(closed.poles()),
@@ -152,10 +160,13 @@ def test_policies_with_a_memory_are_refused(
     one_sentence: Callable[[BaseException], str],
 ) -> None:
     game = quick_scenario()
-    for policy in (CascadedPID(game.station_keeping()), Controller(game)):
+    for policy in (
+        OnVehicle(CascadedPID(game.station_keeping()), game.station_keeping()),
+        Controller(game),
+    ):
         with pytest.raises(InputError) as caught:
             to_control(game, policy)
-        assert type(policy).__name__ in one_sentence(caught.value)
+        assert type(getattr(policy, "policy", policy)).__name__ in one_sentence(caught.value)
 
 
 def test_without_python_control(

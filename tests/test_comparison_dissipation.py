@@ -18,13 +18,13 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.merit import GameValue, dissipation_margin
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.offline import DirectSolver
 from stationkeep.online import build_disturbance, draw_samples, run, to_dataset
-from stationkeep.online.vehicle import HeldPlant, PlantState
+from stationkeep.online.loop import PlantState
+from stationkeep.online.vehicle import HeldPlant
 from stationkeep.symbolic import Problem
 
-from .games import HALF_WIDTHS, Array, linear_quadratic, quick_scenario, two_state
+from .games import HALF_WIDTHS, Array, linear_on, linear_quadratic, quick_scenario, two_state
 
 Gradient = Callable[[Array], Array]
 
@@ -105,7 +105,7 @@ def test_nothing_is_lost_along_a_run_in_a_current() -> None:
         ),
     )
     station, game = scenario.station_keeping(), scenario.station_keeping().game
-    history = run(scenario, LinearPolicy(station))
+    history = run(scenario, linear_on(station))
     solver = DirectSolver(station.problem, horizon=60.0, n_intervals=24, degree=6, grading=6.0)
     plant = HeldPlant(station, build_disturbance(scenario.simulation.disturbance))
     nodes, weights = np.polynomial.legendre.leggauss(3)

@@ -12,13 +12,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.adapters.gym import StationKeepingEnv
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.comparison.records import online_record
 from stationkeep.symbolic import InputError
 from stationkeep.symbolic.underwater import STATE_NAMES
 
 from .commands import QUICK
-from .games import Array, quick_scenario
+from .games import Array, linear_on, quick_scenario
 
 CALM = "simulation.mode=disturbed"  # no second player, and no disturbance
 
@@ -44,8 +43,11 @@ def test_the_return_is_the_cost_of_the_run(actions: Any) -> None:
     """The linear policy through the environment, beside the record of the same run."""
     game = quick_scenario(CALM)
     station = game.station_keeping()
-    record = online_record(game, policy=lambda: LinearPolicy(station), kind="linear")
-    env, policy = StationKeepingEnv(game, actions=actions), LinearPolicy(station)
+    record = online_record(game, policy=lambda: linear_on(station), kind="linear")
+    env, policy = (
+        StationKeepingEnv(game, actions=actions),
+        linear_on(station),
+    )
     _, info = env.reset(seed=0, options={"state": game.initial_state})
     total, states, ended = 0.0, [info["zeta"]], False
     while not ended:

@@ -20,13 +20,21 @@ from stationkeep.comparison.merit import (
     run_metrics,
 )
 from stationkeep.comparison.merit.metrics import energy, peak_thrust
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.comparison.records import online_record, optimal_record
 from stationkeep.offline import OfflineSolver, Trajectory
 from stationkeep.online import run, to_dataset
 from stationkeep.symbolic import Setup, Vehicle
 
-from .games import FAR_STATE, FAR_VALUE, FAST_STATE, FAST_VALUE, Array, quick_scenario, two_state
+from .games import (
+    FAR_STATE,
+    FAR_VALUE,
+    FAST_STATE,
+    FAST_VALUE,
+    Array,
+    linear_on,
+    quick_scenario,
+    two_state,
+)
 
 FROM_REST = "simulation.initial_state=[0,0,0,0,0,0,0,0,0,0,0,0]"
 DISTURBED = ("simulation.mode=disturbed", "simulation.disturbance.kind=constant")
@@ -191,7 +199,7 @@ def test_the_optimum_is_the_cheapest() -> None:
     scenario = quick_scenario("simulation.duration=40")
     station = scenario.station_keeping()
     value = optimum().attrs["value"]
-    record = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
+    record = online_record(scenario, policy=lambda: linear_on(station), kind="linear")
     metrics = run_metrics(record, station, value)
     assert metrics.stopped is None
     assert metrics.regret is not None
@@ -247,7 +255,7 @@ def test_dissipation_from_a_state() -> None:
     force = "simulation.disturbance.force=[1,0,0,0,0,0]"
     scenario = quick_scenario(*DISTURBED, force, "simulation.duration=10")
     station = scenario.station_keeping()
-    record = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
+    record = online_record(scenario, policy=lambda: linear_on(station), kind="linear")
     start = float(optimum().attrs["value"])
     assert GameValue(station)(scenario.initial_state) == pytest.approx(start, rel=1e-5)
     end = GameValue(station)(record["zeta"].values[-1])

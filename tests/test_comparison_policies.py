@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 from scipy.spatial.transform import Rotation
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.comparison.report.figures import wrench_limits
 from stationkeep.symbolic import StationKeeping, Thrusters, Vehicle
 
-from .games import Array, quick_scenario
+from .games import Array, linear_on, quick_scenario
 
 
 def riccati(station: StationKeeping) -> tuple[Array, Array]:
@@ -40,7 +39,7 @@ def euler_jacobian(eta: Array) -> Array:
 def test_linear_policy(vehicle: str) -> None:
     station = quick_scenario(f"vehicle={vehicle}").station_keeping()
     B, P = riccati(station)
-    policy = LinearPolicy(station)
+    policy = linear_on(station)
     zeta = np.array([0.7, -0.35, 0.35, 0.1, -0.07, 0.35, 0.1, 0.2, -0.1, 0.05, -0.03, 0.02])
     tau_b = policy.step(zeta[:6], zeta[6:], 0.02)
     expected = -np.linalg.inv(station.game.R) @ B.T @ P @ zeta
@@ -55,7 +54,7 @@ def test_linear_policy(vehicle: str) -> None:
 
 
 def test_linear_policy_rests_at_the_station() -> None:
-    policy = LinearPolicy(quick_scenario().station_keeping())
+    policy = linear_on(quick_scenario().station_keeping())
     np.testing.assert_array_equal(policy.step(np.zeros(6), np.zeros(6), 0.02), np.zeros(6))
 
 

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.comparison.records import OFFLINE_KEY, online_record, optimal_record, provenance
 from stationkeep.offline import OfflineSolver
 from stationkeep.online import load
 
 from .commands import QUICK, ROUGH
-from .games import quick_scenario
+from .games import linear_on, quick_scenario
 
 BASIS = """
 import casadi
@@ -70,7 +69,7 @@ def test_another_policy_makes_it_again(kept: Path) -> None:
     scenario = quick_scenario()
     station = scenario.station_keeping()
     before = load(kept).attrs["key"]
-    linear = online_record(scenario, kept, policy=lambda: LinearPolicy(station), kind="linear")
+    linear = online_record(scenario, kept, policy=lambda: linear_on(station), kind="linear")
     assert linear.attrs["key"] != before
     assert linear.sizes["learn_time"] == 0
 

@@ -36,7 +36,7 @@ def stack(history: History) -> dict[str, Array]:
     lists = {
         name: value
         for name, value in vars(history).items()
-        if isinstance(value, list) and value and name != "looks"
+        if isinstance(value, list) and value and name not in ("looks", "policy_seconds")
     }
     seen = [vars(look) for look in history.looks]
     lists |= {f"look's {name}": [look[name] for look in seen] for name in (seen[0] if seen else ())}

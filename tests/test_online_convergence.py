@@ -181,6 +181,13 @@ class SamePlant:
         self.simulation: SimulationSettings = quick.simulation
         self._setup = setup
 
+    @property
+    def initial_state(self) -> Array:
+        return np.array(self.simulation.initial_state)
+
+    def setup(self) -> StationKeeping:
+        return self._setup
+
     def station_keeping(self) -> StationKeeping:
         return self._setup
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.offline import DirectSolver
 from stationkeep.online import (
     Controller,
@@ -22,7 +21,7 @@ from stationkeep.online import (
     to_dataset,
 )
 
-from .games import TWO_STATE_WEIGHTS, Array, quick_scenario, two_state
+from .games import TWO_STATE_WEIGHTS, Array, linear_on, quick_scenario, two_state
 
 REFERENCE = np.array([0.8, 0.2, 1.4])
 SETTINGS = LearnerSettings(error="costate", safeguard=True, steps=200)
@@ -129,7 +128,7 @@ def test_frozen_weights_are_far_better_than_linear_in_the_whole_envelope(tmp_pat
     kept = scenario.with_settings(learner={"weights": str(path)})
     states = draw_samples(envelope, 8, 22)
     frozen = np.array([regret(kept, zeta, Controller(kept, learn=False)) for zeta in states])
-    linear = np.array([regret(scenario, zeta, LinearPolicy(station)) for zeta in states])
+    linear = np.array([regret(scenario, zeta, linear_on(station)) for zeta in states])
     assert np.median(frozen) < np.median(linear) / 3.0
     assert frozen.max() < linear.max() / 2.0
     assert np.all(frozen < linear)

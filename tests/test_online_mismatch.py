@@ -7,13 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from stationkeep.comparison.merit import dissipation_margin
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.comparison.records import online_record, provenance
 from stationkeep.online import NoiseSettings, run
 from stationkeep.online.vehicle import MeasurementNoise
 from stationkeep.symbolic import InputError, Model, Vehicle
 
-from .games import Array, quick_scenario
+from .games import Array, linear_on, quick_scenario
 
 NOISE = "simulation.noise={position=0.02, attitude=0.01, velocity=0.03, rate=0.005, seed=7}"
 OTHER = "simulation.plant=bluerov2-heavy-2024"
@@ -69,7 +68,7 @@ def test_the_plant_may_be_another_vehicle() -> None:
     """Its acceleration is the other vehicle's, by that vehicle's own compiled dynamics."""
     scenario = quick_scenario(DISTURBED, OTHER, "simulation.duration=2")
     station, other = scenario.station_keeping(), Model(Vehicle.load("bluerov2-heavy-2024"))
-    history = run(scenario, LinearPolicy(station))
+    history = run(scenario, linear_on(station))
     for i in (0, 50, 100):
         zeta, tau_b = history.zeta[i], history.tau_b[i]
         (rate,) = other.plant(zeta, tau_b, np.zeros(6), np.zeros(3), np.zeros(3))
@@ -109,7 +108,7 @@ def test_dissipation_of_the_linear_quadratic_game() -> None:
         "simulation.tolerance=1e-10",
     )
     station = scenario.station_keeping()
-    record = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
+    record = online_record(scenario, policy=lambda: linear_on(station), kind="linear")
     zeta, d = record["zeta"].values, record["u_disturbance"].values
     game, P = station.game, station.problem.P
     B = np.vstack([np.zeros((6, 6)), np.linalg.inv(station.model.vehicle.M)])

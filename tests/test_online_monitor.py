@@ -17,7 +17,7 @@ from stationkeep.online import (
 )
 from stationkeep.online.laws import NormalEquations
 from stationkeep.online.learning.monitor import row_margin, row_rank
-from stationkeep.online.vehicle import fixed_points
+from stationkeep.online.loop import fixed_points
 
 from .games import TWO_STATE_WEIGHTS, Array, quick_scenario, two_state
 

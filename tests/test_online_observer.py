@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.comparison.records import online_record
 from stationkeep.online import DisturbanceObserver, run
 from stationkeep.symbolic import InputError
 
-from .games import Array, quick_scenario
+from .games import Array, linear_on, quick_scenario
 
 FROM_REST = "simulation.initial_state=[0,0,0,0,0,0,0,0,0,0,0,0]"
 FAST = "simulation.initial_state=[1, -1, 1, 0.3, 0.2, 1, 0.3, 0.2, -0.4, 0.4, 0.3, 0.5]"
@@ -39,7 +38,10 @@ def lag_error(start: str, period: float) -> float:
     push = f"simulation.disturbance={{kind='constant', force={force.tolist()}}}"
     timed = ("simulation.duration=3", f"simulation.control_period={period}")
     scenario = quick_scenario(*DISTURBED, start, push, OBSERVED, *timed)
-    history = run(scenario, LinearPolicy(scenario.station_keeping()))
+    history = run(
+        scenario,
+        linear_on(scenario.station_keeping()),
+    )
     lag = 1.0 - np.exp(-0.7 * np.array(history.time))
     return float(np.abs(history.estimate - lag[:, None] * force).max())
 
@@ -69,7 +71,7 @@ def test_with_the_observer_the_vehicle_stays_in_a_current() -> None:
     flow = "simulation.disturbance.velocity=[0.2, 0.1, 0.05]"
     scenario = quick_scenario(*CURRENT, flow, OBSERVED, "simulation.duration=120")
     station = scenario.station_keeping()
-    record = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
+    record = online_record(scenario, policy=lambda: linear_on(station), kind="linear")
     assert np.abs(record["zeta"].values[-1]).max() < 1e-4
     v = np.array([0.2, 0.1, 0.05])
     drag = np.array([13.7, 0.0, 33.0]) * v + np.array([141.0, 217.0, 190.0]) * v**2
@@ -78,7 +80,7 @@ def test_with_the_observer_the_vehicle_stays_in_a_current() -> None:
     np.testing.assert_allclose(estimate, record["u_disturbance"].values[-1], atol=1e-3)
     np.testing.assert_allclose(record["u_control"].values[-1], -estimate, atol=1e-3)
     bare = quick_scenario(*CURRENT, flow, "simulation.duration=120")
-    assert run(bare, LinearPolicy(station)).zeta[-1][0] > 0.5
+    assert run(bare, linear_on(station)).zeta[-1][0] > 0.5
 
 
 def test_it_does_not_wind_up_where_the_thrusters_give_less() -> None:
@@ -86,7 +88,10 @@ def test_it_does_not_wind_up_where_the_thrusters_give_less() -> None:
     flow = "simulation.disturbance.velocity=[1.5, 0, 0]"
     limited = ("simulation.thruster_limits=true", "simulation.chi=100", "simulation.duration=8")
     scenario = quick_scenario(*CURRENT, flow, OBSERVED, *limited, "simulation.control_period=0.02")
-    history = run(scenario, LinearPolicy(scenario.station_keeping()))
+    history = run(
+        scenario,
+        linear_on(scenario.station_keeping()),
+    )
     assert history.stopped is None
     assert np.mean(history.saturated) > 0.3
     d, lagged = np.array(history.disturbance), np.zeros((len(history.time), 6))
@@ -98,7 +103,10 @@ def test_it_does_not_wind_up_where_the_thrusters_give_less() -> None:
 
 def test_a_known_current_is_no_disturbance() -> None:
     scenario = quick_scenario(*DISTURBED, "current=[0.2, 0.1, 0]", OBSERVED)
-    history = run(scenario, LinearPolicy(scenario.station_keeping()))
+    history = run(
+        scenario,
+        linear_on(scenario.station_keeping()),
+    )
     np.testing.assert_allclose(history.estimate, 0.0, atol=1e-6)
 
 

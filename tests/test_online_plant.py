@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from stationkeep.online import DisturbanceSettings, build_disturbance
-from stationkeep.online.vehicle import Disturbance, HeldPlant, PlantState
+from stationkeep.online.loop import PlantState
+from stationkeep.online.vehicle import Disturbance, HeldPlant
 from stationkeep.symbolic import RunError, StationKeeping
 
 from .games import Array, quick_scenario

@@ -12,17 +12,19 @@ import numpy as np
 import pytest
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.online import History, load, load_weights, run, save, to_dataset
+from stationkeep.online import VehicleHistory, load, load_weights, run, save, to_dataset
 from stationkeep.online.records import write_text, written_whole
 from stationkeep.symbolic import InputError
 
 from .games import QUICK, Array, quick_scenario
 
+PROBLEM = quick_scenario().setup().problem
+
 Check = Callable[[BaseException], str]
 
 
 @cache
-def history() -> History:
+def history() -> VehicleHistory:
     return run(quick_scenario("simulation.duration=0.6"))
 
 
@@ -98,7 +100,7 @@ def test_round_trip_keeps_every_bit(dataset: xr.Dataset, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("stopped", ["the state left chi at t = 0.00 s", None])
 def test_an_empty_run_is_a_record_too(stopped: str | None, tmp_path: Path) -> None:
-    empty = to_dataset(History(stopped=stopped), {"seed": 1})
+    empty = to_dataset(VehicleHistory(PROBLEM, stopped=stopped), {"seed": 1})
     again = load(save(empty, tmp_path / "empty.nc"))
     assert again.identical(empty)
     assert again.sizes["time"] == again.sizes["learn_time"] == 0
@@ -106,7 +108,7 @@ def test_an_empty_run_is_a_record_too(stopped: str | None, tmp_path: Path) -> No
 
 
 def test_a_run_without_learner_is_a_record_too(tmp_path: Path) -> None:
-    alone = History(time=[0.0, 0.02], zeta=[np.ones(12)] * 2, tau_b=[np.ones(6)] * 2)
+    alone = VehicleHistory(PROBLEM, time=[0.0, 0.02], zeta=[np.ones(12)] * 2, tau_b=[np.ones(6)] * 2)
     alone.u_control, alone.disturbance = [np.ones(6)] * 2, [np.ones(6)] * 2
     alone.cost, alone.attenuated = [0.0, 1.0], [0.0, 0.5]
     written = to_dataset(alone, {})
@@ -251,7 +253,7 @@ def test_records_without_weights_are_refused(kind: str, tmp_path: Path, one_sent
     if kind == "another dataset":
         save(xr.Dataset({"x": ("time", [1.0])}), path)
     else:
-        save(to_dataset(History(), {}), path)
+        save(to_dataset(VehicleHistory(PROBLEM), {}), path)
     with pytest.raises(InputError, match="holds no learned weights") as caught:
         load_weights(path)
     one_sentence(caught.value)
@@ -281,7 +283,8 @@ def test_a_run_goes_on_from_a_record(dataset: xr.Dataset, tmp_path: Path) -> Non
 
 
 def test_weights_of_another_basis_are_refused(tmp_path: Path, one_sentence: Check) -> None:
-    other = History(learn_time=[0.0], critic=[np.ones(5)], actor_1=[np.ones(5)], actor_2=[np.ones(5)])
+    five = [np.ones(5)]
+    other = VehicleHistory(PROBLEM, learn_time=[0.0], critic=five, actor_1=five, actor_2=five)
     other.bellman_error, other.sample_error = [0.0], [0.0]
     other.projecting, other.fallback, other.linear = [False], [False], [False]
     other.predicted_cost, other.accepted = [1.0], [1.0]

@@ -24,9 +24,9 @@ from stationkeep.symbolic import (
     expressions,
     find_function,
 )
-from stationkeep.symbolic.compilation import c_source
+from stationkeep.symbolic.compiled import dense_function
+from stationkeep.symbolic.compiled.compilation import c_source
 from stationkeep.symbolic.expressions import OPERATIONS, from_data, to_data
-from stationkeep.symbolic.kernel import dense_function
 from stationkeep.symbolic.textbook import double_integrators, quadrotor, two_state_game
 
 Array = NDArray[np.float64]

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from stationkeep.offline import OfflineSolver
-from stationkeep.offline.plant import Plant
-from stationkeep.online import Learner, LearnerSettings
-from stationkeep.online.settings import SampleSettings
+from stationkeep.offline import OfflineSolver, Plant
+from stationkeep.online import Learner, LearnerSettings, SampleSettings
 from stationkeep.symbolic import (
     Basis,
     GammaTooSmallError,

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...online import Controller, Policy
+from ...online import Controller, VehiclePolicy
 from ...symbolic import InputError, Kernel, Model
 from ...symbolic.arrays import Array
 from ...symbolic.underwater import FORCE_NAMES, STATE_NAMES
-from ..policies import LinearPolicy
+from ..policies import LinearPolicy, OnVehicle
 from ..scenario import Scenario
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ WRENCH = [f"tau_{name}" for name in FORCE_NAMES]
 DISTURBANCE = [f"tau_d_{name}" for name in FORCE_NAMES]
 
 
-def to_control(scenario: Scenario, policy: Policy | None = None) -> control.NonlinearIOSystem:
+def to_control(scenario: Scenario, policy: VehiclePolicy | None = None) -> control.NonlinearIOSystem:
     """Return the driven vehicle of a scenario as a continuous-time system, in its known current.
 
     Parameters
@@ -105,13 +105,15 @@ def _wrench(model: Model, law: Law) -> Law:
     return wrench
 
 
-def _law(policy: Policy) -> Law:
+def _law(policy: VehiclePolicy) -> Law:
     """Return u_1 as a function of ζ alone."""
-    if isinstance(policy, LinearPolicy):
-        return lambda zeta: policy.control(zeta, 0.0)
-    if isinstance(policy, Controller) and not policy.learn:
+    if isinstance(policy, OnVehicle) and isinstance(policy.policy, LinearPolicy):
+        law = policy.policy
+        return lambda zeta: law.control(zeta, 0.0)
+    if isinstance(policy, Controller) and not policy.learned.learn:
         return lambda zeta: policy.learner.policies(zeta)[0]
+    kind = type(policy.policy if isinstance(policy, OnVehicle) else policy).__name__
     raise InputError(
-        f"a {type(policy).__name__} that learns or remembers is no function of the state; give a "
+        f"a {kind} that learns or remembers is no function of the state; give a "
         "LinearPolicy, or a Controller made with learn=False"
     )

@@ -56,6 +56,11 @@ class OnVehicle:
         self.zeta = np.zeros(12)
 
     @property
+    def u_control(self) -> Array:
+        """The policy's u_1 at the last state, without trim, (6,) [N, N m]."""
+        return self.policy.u_control
+
+    @property
     def u_disturbance(self) -> Array:
         """The policy's u_2 at the last state, (6,) [N, N m]."""
         return self.policy.u_disturbance

@@ -119,12 +119,12 @@ def _from_file(name: str) -> Callable[[Setup], Policy]:
 
     def law(setup: Setup) -> Policy:
         made = make(setup)
-        if hasattr(made, "step") and hasattr(made, "u_disturbance"):
+        if all(hasattr(made, name) for name in ("step", "u_control", "u_disturbance")):
             return made  # type: ignore[no-any-return]
         if not callable(made):
             raise InputError(
                 f"'{name}' returns a {type(made).__name__}, but must return a function of the state, "
-                "or an object with step(zeta, dt) and u_disturbance"
+                "or an object with step(zeta, dt), u_control and u_disturbance"
             )
         return FunctionPolicy(setup.problem, made)
 

@@ -17,8 +17,13 @@ class Policy(Protocol):
 
     Attributes
     ----------
-    u_disturbance : (k_2,) u_2 at the last state
+    u_control, u_disturbance : (k,), (k_2,) u_1 and u_2 at the last state
     """
+
+    @property
+    def u_control(self) -> Array:
+        """u_1 at the last state, (k,)."""
+        ...
 
     @property
     def u_disturbance(self) -> Array:
