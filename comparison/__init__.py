@@ -1,7 +1,7 @@
 """Comparison of the learned policy with the offline optimum."""
 
+from .compare import Study, compare
 from .scenario import Scenario
-from .study import Comparison, compare
 from .theory import Condition, check
 
-__all__ = ["Comparison", "Condition", "Scenario", "check", "compare"]
+__all__ = ["Condition", "Scenario", "Study", "check", "compare"]

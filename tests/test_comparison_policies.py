@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import solve_continuous_are
 from scipy.spatial.transform import Rotation
 from stationkeep.comparison.policies import LinearPolicy
-from stationkeep.comparison.report.figures import wrench_limits
+from stationkeep.comparison.report.vehicle_figures import wrench_limits
 from stationkeep.symbolic import StationKeeping, Thrusters, Vehicle
 
 from .games import Array, quick_scenario

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ...offline import DirectSolution, DirectSolver
-from ...symbolic import StationKeeping, Vehicle
+from ...symbolic import Setup, StationKeeping, Vehicle
 from ...symbolic.arrays import Array
 
 
@@ -147,10 +147,8 @@ def dissipation_margin(record: xr.Dataset, V_start: float, V_end: float) -> floa
 class GameValue:
     """V* of a game at any state by one structured Newton solve, to about 1e-6 of itself."""
 
-    def __init__(self, station: StationKeeping) -> None:
-        self._solver = DirectSolver(
-            station.problem, horizon=60.0, n_intervals=16, degree=6, grading=6.0
-        )
+    def __init__(self, setup: Setup) -> None:
+        self._solver = DirectSolver(setup.problem, horizon=60.0, n_intervals=16, degree=6, grading=6.0)
 
     def __call__(self, zeta: Array) -> float:
         """Return V*(ζ); raises RunError where the solver does not converge."""
