@@ -25,7 +25,7 @@ from stationkeep.comparison.theory.exact_basis import exact_bound
 from stationkeep.comparison.theory.uub import Gains, Knowledge, constants, distance, lyapunov, measure
 from stationkeep.offline import Pairs
 from stationkeep.online import Learner, LearnerSettings, draw_samples, rank_margin
-from stationkeep.online.rows import BellmanTerms, bellman_error
+from stationkeep.online.paper import BellmanTerms, bellman_error
 from stationkeep.symbolic import Basis, ValueFunctions, quadratic, two_state_game
 
 POLICIES = ("learned", "quadratic", "gradient")

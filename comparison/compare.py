@@ -98,7 +98,7 @@ def compare(
             raise InputError(f"the {name} is {number}, but must be at least 1")
     if isinstance(scenario, str):
         scenario = Scenario.load(scenario)
-    over, folder = Field.of(field, scenario.station_keeping().problem), Path(out)
+    over, folder = Field.of(field, scenario.setup().problem), Path(out)
     told = _silent if tell is None else tell
     found = compared(scenario, states, over, folder / "records", workers, told)
     return Study(**vars(found), out=folder)
@@ -106,7 +106,7 @@ def compare(
 
 def require_film(scenario: Scenario) -> None:
     """Raise InputError unless there can be a film of a scenario's run: of a vehicle from above."""
-    setup = scenario.station_keeping()
+    setup = scenario.setup()
     if not isinstance(setup, StationKeeping):
         raise InputError(
             f"there is no animation of '{setup.problem.name}', which is no vehicle; leave it out"

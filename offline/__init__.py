@@ -1,9 +1,9 @@
 """Offline optimum: collocation, IPOPT, and the checks that don't trust its status."""
 
 from .certificate import Certificate
-from .direct import DirectSolution, DirectSolver
+from .direct import DirectSolution, DirectSolver, QuickValue
 from .ideal_weights import ErrorSize, IdealWeights, Pairs, error_sizes, fit_weights
-from .path import Plant, Trajectory
+from .path import MeshSettings, Plant, Trajectory
 from .responses import (
     BestResponse,
     ControlPolicy,
@@ -25,8 +25,8 @@ from .saddle import (
     SaddleSolver,
     value_against_gamma,
 )
-from .settings import OfflineSettings
-from .solve import OfflineSolution, OfflineSolver, horizon_of, solve
+from .settings import OfflineSettings, horizon_of
+from .solve import OfflineSolution, OfflineSolver, solve
 
 __all__ = [
     "BestResponse",
@@ -41,11 +41,13 @@ __all__ = [
     "GammaPoint",
     "IdealWeights",
     "MeasuredGain",
+    "MeshSettings",
     "OfflineSettings",
     "OfflineSolution",
     "OfflineSolver",
     "Pairs",
     "Plant",
+    "QuickValue",
     "SaddleGap",
     "SaddleSolution",
     "SaddleSolver",

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
+from ..symbolic import Problem
 from ..symbolic.toml import Settings
+from .path import MeshSettings
 
 Method = Literal["newton", "ipopt"]
 
@@ -32,9 +35,9 @@ class OfflineSettings(Settings):
     """
 
     horizon: PositiveFloat | None = None
-    intervals: PositiveInt = 24
-    degree: Annotated[int, Field(ge=1, le=8)] = 6
-    grading: NonNegativeFloat = 5.0
+    intervals: PositiveInt = MeshSettings.certified.n_intervals
+    degree: Annotated[int, Field(ge=1, le=8)] = MeshSettings.certified.degree
+    grading: NonNegativeFloat = MeshSettings.certified.grading
     aligned: bool = True
     rounds: PositiveInt = 5
     starts: NonNegativeInt = 4
@@ -43,3 +46,21 @@ class OfflineSettings(Settings):
     defect_tolerance: PositiveFloat = 1e-6
     hji_tolerance: PositiveFloat = 1e-7
     costate_tolerance: PositiveFloat = 1e-5
+
+    def mesh(self, horizon: float) -> MeshSettings:
+        """Return the first mesh, over a horizon [s]; normally that of `horizon_of`."""
+        return MeshSettings(horizon, self.intervals, self.degree, self.grading)
+
+
+def horizon_of(problem: Problem, settings: OfflineSettings) -> float:
+    """Return T [s], that of the settings or one after which the closed loop has decayed enough.
+
+    The state falls like e^(-α T), α the slowest rate of the linearised closed loop, and the cost to go
+    like its square; T makes that a hundredth of the requested value error, and of the costate's.
+    Doubling T is part of the certificate.
+    """
+    if settings.horizon is not None:
+        return settings.horizon
+    by_value = -np.log(0.01 * settings.value_tolerance) / 2.0
+    by_costate = -np.log(0.01 * settings.costate_tolerance) / 2.0
+    return float(max(by_value, by_costate) / problem.decay_rate)

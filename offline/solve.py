@@ -14,7 +14,7 @@ from .certificate import Certificate
 from .direct import DirectSolution, DirectSolver, Refined, find_extremals, refine
 from .path import Trajectory, extended, halved
 from .saddle import SaddleSolution, SaddleSolver
-from .settings import OfflineSettings
+from .settings import OfflineSettings, horizon_of
 
 
 @dataclass(frozen=True)
@@ -59,12 +59,7 @@ class OfflineSolver:
         self.settings = OfflineSettings() if settings is None else settings
         self.horizon = horizon_of(problem, self.settings)
         self.direct = DirectSolver(
-            problem,
-            horizon=self.horizon,
-            n_intervals=self.settings.intervals,
-            degree=self.settings.degree,
-            grading=self.settings.grading,
-            method=self.settings.method,
+            problem, self.settings.mesh(self.horizon), method=self.settings.method
         )
 
     def solve(self, zeta0: Array, guess: Trajectory | None = None) -> OfflineSolution:
@@ -192,20 +187,6 @@ class OfflineSolver:
     @cached_property
     def _saddle(self) -> SaddleSolver:
         return SaddleSolver(self.problem, horizon=self.horizon)
-
-
-def horizon_of(problem: Problem, settings: OfflineSettings) -> float:
-    """Return T [s], that of the settings or one after which the closed loop has decayed enough.
-
-    The state falls like e^(-α T), α the slowest rate of the linearised closed loop, and the cost to go
-    like its square; T makes that a hundredth of the requested value error, and of the costate's.
-    Doubling T is part of the certificate.
-    """
-    if settings.horizon is not None:
-        return settings.horizon
-    by_value = -np.log(0.01 * settings.value_tolerance) / 2.0
-    by_costate = -np.log(0.01 * settings.costate_tolerance) / 2.0
-    return float(max(by_value, by_costate) / problem.decay_rate)
 
 
 def solve(problem: Problem, zeta0: Array, settings: OfflineSettings | None = None) -> OfflineSolution:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi
 import numpy as np
 import pytest
 from casadi import SX
 from hypothesis import given
 from hypothesis import strategies as st
-from stationkeep.offline import Plant, Trajectory
-from stationkeep.offline.path import RadauRule, aligned_mesh, graded_mesh, sign_changes
-from stationkeep.symbolic import Game, Problem
+from stationkeep.offline import DirectSolver, MeshSettings, Plant, Trajectory
+from stationkeep.offline.path import RadauRule, aligned_mesh, graded_mesh, settle, sign_changes
+from stationkeep.symbolic import Game, InputError, Problem
 
 from .games import Array, two_state
 
@@ -89,6 +91,50 @@ def test_events_at_or_beyond_the_ends_leave_them() -> None:
     np.testing.assert_array_equal(aligned_mesh(mesh, np.array([1.0])), mesh)
 
 
+NAMED = ["direct", "certified", "saddle", "quick", "regret", "prediction"]
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_named_settings_give_their_mesh(name: str) -> None:
+    settings: MeshSettings = getattr(MeshSettings, name)
+    lengths = np.diff(settings.points)
+    assert len(lengths) == settings.n_intervals
+    assert settings.points[-1] == settings.horizon
+    ratio = np.exp(settings.grading * (1.0 - 1.0 / settings.n_intervals))
+    assert lengths[-1] / lengths[0] == pytest.approx(ratio, rel=1e-9)
+
+
+@pytest.mark.parametrize("grading", [0.0, 3.0, 6.0])
+def test_lengthened_settings_keep_the_first_intervals(grading: float) -> None:
+    short = MeshSettings(horizon=60.0, n_intervals=20, degree=5, grading=grading)
+    long = short.lengthened(150.0)
+    assert long.points[-1] == 150.0
+    assert long.degree == 5
+    first = np.diff(short.points)[0], np.diff(long.points)[0]
+    assert first[1] == pytest.approx(first[0], rel=0.1)
+    assert short.lengthened(60.0) == short
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"horizon": 0.0}, {"horizon": np.inf}, {"n_intervals": 0}, {"degree": 0}, {"grading": -1.0}],
+)
+def test_settings_that_are_no_mesh_are_refused(
+    change: dict[str, float], one_sentence: Callable[[BaseException], str]
+) -> None:
+    with pytest.raises(InputError) as refused:
+        DirectSolver(two_state()[0], **change)  # type: ignore[arg-type]
+    assert "mesh" in one_sentence(refused.value)
+
+
+def test_settings_and_keywords_are_one_mesh() -> None:
+    problem, _, _ = two_state()
+    settings = MeshSettings.direct.changed(horizon=12.0, n_intervals=9)
+    one, other = DirectSolver(problem, settings), DirectSolver(problem, horizon=12.0, n_intervals=9)
+    np.testing.assert_array_equal(one.mesh, other.mesh)
+    assert one.degree == other.degree == MeshSettings.direct.degree
+
+
 def oscillators() -> Plant:
     """Three states that switch where they vanish; their dynamics play no part."""
     zeta = SX.sym("zeta", 3)
@@ -158,3 +204,42 @@ def test_smooth_plant_has_no_switches() -> None:
     path = path_of([np.sin, np.cos, np.ones_like], mesh)
     assert sign_changes(Plant(problem), path).shape == (0,)
     assert casadi.SX(problem.switching).shape[0] == 0
+
+
+def test_mesh_settles_on_an_event_that_moves_with_the_mesh() -> None:
+    """A solution whose crossing is a thousand times nearer to t = 0.7 after every solve."""
+    mesh, constant = np.linspace(0.0, 2.0, 5), np.ones_like
+    meshes: list[Array] = []
+
+    def crossing(k: int) -> float:
+        return 0.7 + 0.1 * 0.001**k
+
+    def solve_on(points: Array, before: Trajectory | None) -> Trajectory:
+        meshes.append(points)
+        root = crossing(len(meshes) - 1)
+        return path_of([lambda t: t - root, constant, constant], points)
+
+    solutions, events = settle(oscillators(), mesh, solve_on(mesh, None), lambda path: path, solve_on)
+    # the fourth solution has its crossing within 1e-6 of the mesh point that the third gave it
+    assert len(solutions) == len(meshes) == 4
+    np.testing.assert_allclose(events, [crossing(2)], atol=1e-10)
+    for k, points in enumerate(meshes[1:]):
+        np.testing.assert_allclose(points, [0.0, 0.5, crossing(k), 1.0, 1.5, 2.0], atol=1e-10)
+
+
+def test_mesh_that_does_not_settle_ends_after_its_rounds() -> None:
+    constant = np.ones_like
+
+    def solve_on(points: Array, before: Trajectory | None) -> Trajectory:
+        root = 0.9 if before is None or before.states[0, 0] > -0.8 else 0.6
+        return path_of([lambda t: t - root, constant, constant], points)
+
+    mesh = np.linspace(0.0, 2.0, 5)
+    first = solve_on(mesh, None)
+    solutions, events = settle(oscillators(), mesh, first, lambda path: path, solve_on, rounds=3)
+    assert len(solutions) == 4
+    np.testing.assert_allclose(events, [0.9], atol=1e-10)
+    fixed, _ = settle(
+        oscillators(), mesh, first, lambda path: path, solve_on, fixed=np.array([1.0]), rounds=1
+    )
+    np.testing.assert_allclose(fixed[-1].mesh, [0.0, 0.5, 0.9, 1.0, 1.5, 2.0], atol=1e-10)

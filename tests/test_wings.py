@@ -19,12 +19,12 @@ ROOT = Path(__file__).resolve().parents[1]
 # in each folder the wings from the ground up: one imports only those before it
 WINGS = {
     "symbolic": (
-        *("arrays", "errors", "toml", "integration", "compiled"),
+        *("arrays", "errors", "toml", "pyfile", "expressions", "integration", "compiled"),
         *("game", "value", "underwater", "textbook"),
     ),
-    "online": ("laws", "rows", "learning", "vehicle", "records"),
+    "online": ("paper", "laws", "rows", "learning", "loop", "vehicle", "records", "simulate"),
     "offline": (
-        *("settings", "path", "direct", "saddle", "certificate", "solve"),
+        *("path", "settings", "direct", "saddle", "certificate", "solve"),
         *("responses", "ideal_weights"),
     ),
     "comparison": (

@@ -21,14 +21,7 @@ def ipopt(problem: Problem, mesh: Mesh) -> Solve:
 
 
 def _solve(problem: Problem, mesh: Mesh, method: Method) -> Solve:
-    solver = DirectSolver(
-        problem,
-        horizon=mesh.horizon,
-        n_intervals=mesh.n_intervals,
-        degree=mesh.degree,
-        grading=mesh.grading,
-        method=method,
-    )
+    solver = DirectSolver(problem, mesh, method=method)
 
     def solve(zeta0: Array) -> float:
         solution = solver.solve(zeta0, verify=False)

@@ -16,7 +16,7 @@ import casadi
 import numpy as np
 from casadi import DM, SX
 from scipy.linalg import expm
-from stationkeep.offline.path import graded_mesh
+from stationkeep.offline import MeshSettings
 from stationkeep.symbolic import Problem
 from stationkeep.symbolic.arrays import Array
 
@@ -24,29 +24,11 @@ Solve = Callable[[Array], float]
 
 
 @dataclass(frozen=True)
-class Mesh:
-    """Intervals that grow geometrically from t = 0.
-
-    Attributes
-    ----------
-    n_intervals : K
-    degree : d, collocation points an interval
-    grading : about the logarithm of the ratio of the last to the first interval
-    horizon : T [s]
-    """
-
-    n_intervals: int
-    degree: int
-    grading: float
-    horizon: float
+class Mesh(MeshSettings):
+    """Intervals that grow geometrically from t = 0, and the points on them."""
 
     def __str__(self) -> str:
         return f"{self.n_intervals} x {self.degree}, {self.grading:g}, {self.horizon:g} s"
-
-    @property
-    def points(self) -> Array:
-        """Interval ends, shape (K + 1,) [s]."""
-        return graded_mesh(self.horizon, self.n_intervals, self.grading)
 
     def times(self, nodes: Array) -> Array:
         """Return the times of `nodes` in (0, 1] on every interval, shape (K len(nodes),) [s]."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import shlex
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
 def _answer(study: Study, report: Path) -> dict[str, Any]:
     regret: dict[str, Any] = dict.fromkeys(study.metrics)
     if study.regret is not None:
-        regret = {name: asdict(sizes) for name, sizes in study.regret.items()}
+        regret = {name: sizes.as_json() for name, sizes in study.regret.items()}
     answer: dict[str, Any] = {
         "regret": regret,
         "envelope_scale": study.scenario.envelope.scale,

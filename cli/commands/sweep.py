@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...comparison import Scenario
+from ...comparison.merit import QUANTILES
 from ...comparison.parallel import Event, locked, run_on_cluster, run_tasks
 from ...comparison.sweep import Bench, Execute, Finished, Plan, Run, Setup, Sweep, parse_vary, summary
 from ...symbolic import InputError, StationkeepError
@@ -120,7 +121,7 @@ def _states(options: argparse.Namespace, scenario: Scenario) -> Array | int:
     try:
         number = int(text)
     except ValueError:
-        return np.array(read_states(Path(text), scenario.station_keeping().problem))
+        return np.array(read_states(Path(text), scenario.setup().problem))
     if number < 1:
         raise InputError(f"--states is {number}, but must be at least 1")
     return number
@@ -144,7 +145,9 @@ def _print(answer: dict[str, Any], scenario: Scenario) -> None:
         row += [_form(group["position_rms"], ".3f"), _form(group["energy"], ".1f")]
         rows.append([*row, _form(group["policy_mean"], ".0f")])
     print_table(
-        "Sweep: over the runs that did not fail; medians where one number is given", header, rows
+        "Sweep: regret with runs that failed as infinite, ∞; else medians of those that did not",
+        header,
+        rows,
     )
     if len(groups) > SHOWN:
         print(f"{len(groups) - SHOWN} more groups are in the table")
@@ -161,8 +164,10 @@ def _print(answer: dict[str, Any], scenario: Scenario) -> None:
 
 
 def _forms(values: dict[str, float | None] | None, factor: float, form: str, unit: str) -> str:
-    known = [factor * value for value in (values or {}).values() if value is not None]
-    return " / ".join(f"{value:{form}}" for value in known) + unit if known else "–"
+    shown = [None if values is None else values[name] for name in QUANTILES]
+    if all(value is None for value in shown):
+        return "–"
+    return " / ".join("∞" if one is None else f"{factor * one:{form}}" for one in shown) + unit
 
 
 def _form(value: float | None, form: str) -> str:

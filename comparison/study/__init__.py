@@ -4,7 +4,7 @@ from .analysis import Field
 from .compared_runs import Tell
 from .comparison import Comparison, compared
 from .excitation import ExcitationRun
-from .reference import Reference, Regret
+from .reference import Reference
 from .words import quantity, subject
 
 __all__ = [
@@ -12,7 +12,6 @@ __all__ = [
     "ExcitationRun",
     "Field",
     "Reference",
-    "Regret",
     "Tell",
     "compared",
     "quantity",

@@ -12,7 +12,7 @@ import xarray as xr
 
 from ...offline import Pairs, Plant, error_sizes, fit_weights
 from ...offline.ideal_weights import least_states
-from ...online.rows import BellmanTerms, bellman_error
+from ...online.paper import BellmanTerms, bellman_error
 from ...symbolic import InputError, Problem, RunError, Setup
 from ...symbolic.arrays import Array
 from ...symbolic.errors import nearest
@@ -20,11 +20,12 @@ from ..merit import GameValue
 from ..optima import TRAINING, Bounds, Ideal, envelope_states, unit_text
 from ..records import provenance, reused
 from ..scenario import Scenario
+from .pace import pace
 from .words import quantity
 
 N_ALONG, N_FIT, N_SIDE = 40, 300, 41
 LEAST_LEFT = 1e-5  # of the cost: after it errors are those of the simulation
-FIELD_TIME = 2.0  # s
+FIELD_TIME = 2.0  # s, at the pace of the shipped vehicle
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,7 @@ def analysis_record(
 def _analysis(
     scenario: Scenario, learned: xr.Dataset, field: Field | None, attributes: dict[str, Any]
 ) -> xr.Dataset:
-    setup = scenario.station_keeping()
+    setup = scenario.setup()
     value = GameValue(setup)
     parts = [_along(setup, learned, value)]
     if field is not None:
@@ -187,7 +188,7 @@ _ALONG = {
 def _around(setup: Setup, learned: xr.Dataset, field: Field) -> xr.Dataset:
     """Return the relative Bellman error over two states around the run."""
     zeta, time = learned["zeta"].values, learned["time"].values
-    moment = int(np.searchsorted(time, min(FIELD_TIME, 0.5 * time[-1])))
+    moment = int(np.searchsorted(time, min(FIELD_TIME / pace(setup), 0.5 * time[-1])))
     here = zeta[moment]
     scale = np.maximum(1.5 * np.abs(zeta[0]), 0.3 * setup.envelope)
     row, column = (np.linspace(-scale[i], scale[i], N_SIDE) for i in (field.rows, field.columns))

@@ -10,10 +10,10 @@ from pathlib import Path
 import xarray as xr
 
 from ...offline import OfflineSolver
-from ...symbolic import RunError, Setup, StationKeeping
-from ..merit import RunMetrics, run_metrics
+from ...symbolic import RunError, Setup
+from ..merit import RunMetrics, regret, run_metrics
 from ..parallel import Work, run_tasks
-from ..policies import CONTENDERS
+from ..policies import available
 from ..records import KIND as CLAIRVOYANT
 from ..records import clairvoyant_record, contender_record, optimal_record
 from ..scenario import Scenario
@@ -39,13 +39,8 @@ class Made:
 
 
 def policies(setup: Setup) -> list[str]:
-    """Return the names of the policies that there are for a problem, those run from every state first.
-
-    The cascaded PID is a vehicle's.
-    """
-    vehicle = isinstance(setup, StationKeeping)
-    names = [name for name in CONTENDERS if vehicle or name != "pid"]
-    return sorted(names, key=lambda name: name in ALONE)
+    """Return the names of the policies for a problem, those that are run from every state first."""
+    return sorted(available(setup), key=lambda name: name in ALONE)
 
 
 def everywhere(setup: Setup) -> list[str]:
@@ -69,7 +64,7 @@ def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
     RunError
         If a worker was lost.
     """
-    reference, setup = reference_of(scenarios[0]), scenarios[0].station_keeping()
+    reference, setup = reference_of(scenarios[0]), scenarios[0].setup()
     tasks = [
         _Task(state, what)
         for state in range(len(scenarios))
@@ -105,7 +100,7 @@ def record_path(folder: Path, state: int, what: str) -> Path:
 def _worker(shipment: tuple[list[Scenario], Path]) -> Work[_Task, RunMetrics | Optimum]:
     """Return what makes one record and tells its figures of merit."""
     scenarios, folder = shipment
-    setup = scenarios[0].station_keeping()
+    setup = scenarios[0].setup()
     solver = OfflineSolver(setup.problem, scenarios[0].offline)
 
     def work(task: _Task) -> Iterator[RunMetrics | Optimum]:
@@ -130,7 +125,4 @@ def _optimum(make: Callable[[], xr.Dataset]) -> Optimum:
 
 
 def _regretted(run: RunMetrics, optimum: float | None, reference: type[Reference]) -> RunMetrics:
-    cost = reference.cost(run)
-    if cost is None or not optimum:
-        return run
-    return replace(run, regret=(cost - optimum) / optimum)
+    return replace(run, regret=regret(reference.cost(run), optimum))

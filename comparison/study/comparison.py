@@ -10,7 +10,7 @@ import xarray as xr
 
 from ...online import draw_samples, load
 from ...symbolic import RunError, Setup
-from ..merit import RunMetrics, distribution
+from ..merit import Regret, RunMetrics
 from ..optima import Ideal
 from ..policies import CONTENDERS
 from ..scenario import Scenario
@@ -18,7 +18,7 @@ from ..theory import Condition, Theory, run_conditions, scenario_conditions, the
 from .analysis import Field, analysis_record, ideal_of
 from .compared_runs import Tell, make_all, policies, record_path
 from .excitation import ExcitationRun, excitation_runs
-from .reference import OPTIMUM, TWO, Optimum, Reference, Regret, reference_of
+from .reference import OPTIMUM, TWO, Optimum, Reference, reference_of
 
 
 @dataclass(frozen=True)
@@ -84,13 +84,13 @@ class Comparison:
 
     @property
     def regret(self) -> dict[str, Regret] | None:
-        """For each policy median, p90, max and the number that diverged.
+        """The distribution over the states for each policy, a run that ended early as infinite.
 
         None without the reference from the scenario's own state.
         """
         if not self.reference.known:
             return None
-        return {name: Regret(**distribution(regrets)) for name, regrets in self.regrets.items()}
+        return {name: Regret.of(regrets) for name, regrets in self.regrets.items()}
 
     @property
     def verdict(self) -> str:
@@ -132,7 +132,7 @@ class Comparison:
 
 def scenarios_from(scenario: Scenario, n_states: int) -> list[Scenario]:
     """Return a scenario from its own state, and from n - 1 seeded ones of its envelope."""
-    envelope = scenario.station_keeping().envelope
+    envelope = scenario.setup().envelope
     states = draw_samples(envelope, n_states - 1, scenario.simulation.seed)
     others = [
         scenario.with_settings(simulation={"initial_state": tuple(state.tolist())}) for state in states
@@ -155,7 +155,7 @@ def compared(
     RunError
         If the offline solver does not converge from the scenario's own state, or a worker was lost.
     """
-    setup = scenario.station_keeping()
+    setup = scenario.setup()
     made = make_all(scenarios_from(scenario, n_states), folder, n_workers, tell)
     if made.optima[OPTIMUM][0].value is None:
         raise RunError(made.optima[OPTIMUM][0].fault)

@@ -9,19 +9,21 @@ for the problem itself the reference is the fixed point of the same rule on ten 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...offline import Plant
 from ...online import Learner, LearnerSettings, draw_samples, rank_margin
-from ...symbolic import Basis, Problem, RunError, quadratic
+from ...symbolic import Basis, Problem, RunError, Setup, quadratic
 from ...symbolic.arrays import Array
 from ..scenario import Scenario
 from .game_run import advance
+from .pace import pace
 from .words import subject
 
 # the Bellman error alone, without what holds the weights
-PLAIN = {
+PLAIN: dict[str, Any] = {
     "rule": "least_squares",
     "error": "bellman",
     "safeguard": False,
@@ -70,10 +72,11 @@ def excitation_runs(
     off in every direction they don't know.
 
     With the quadratic monomials and without leash, so that nothing but the data moves the weights, and
-    in the part `shrink` of the scenario's envelope, where the monomials still have a meaning.
+    in the part `shrink` of the scenario's envelope, where the monomials still have a meaning. The time
+    [s] and the gains are for the pace of the shipped vehicle, and follow that of another problem.
     """
-    setup, name = scenario.station_keeping(), subject(scenario.station_keeping())
-    eager = scenario.learner.model_copy(update=PLAIN)
+    setup, name = scenario.setup(), subject(scenario.setup())
+    eager = scenario.learner.model_copy(update=plain(setup, scenario.learner.period))
     cautious = eager.model_copy(update={"covariance": 1e2, "covariance_bound": 1e3})
     envelope, start = shrink * setup.envelope, shrink * scenario.initial_state
     seed = scenario.samples.seed
@@ -94,7 +97,7 @@ def excitation_runs(
                 draw_samples(envelope, n, seed),
                 start,
                 ideal,
-                duration,
+                duration / pace(setup),
             )
             for run, settings, n in (
                 ("N = 0", eager, 0),
@@ -103,6 +106,14 @@ def excitation_runs(
             )
         ]
     return runs
+
+
+def plain(setup: Setup, period: float) -> dict[str, Any]:
+    """Return `PLAIN` at the pace of a problem that is learned in periods [s]."""
+    faster = pace(setup)
+    gain = 2.0 * faster
+    rates = {"gain_actor_1": gain, "gain_actor_2": gain, "forgetting": min(gain, 0.99 / period)}
+    return PLAIN if faster == 1.0 else PLAIN | rates
 
 
 def fixed_point(

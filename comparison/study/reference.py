@@ -14,30 +14,13 @@ import numpy as np
 import xarray as xr
 
 from ...symbolic import Setup
-from ..merit import GameValue, RunMetrics, dissipation_margin
+from ..merit import GameValue, Regret, RunMetrics, dissipation_margin
 from ..policies import CONTENDERS
 from ..records import KIND as CLAIRVOYANT
 from ..scenario import Scenario
 
 OPTIMUM = "optimal"  # kind of the record of the game's optimum
 TWO = ("learned", "linear")  # policies that a verdict is on; a run of theirs that ends early is a fault
-
-
-@dataclass(frozen=True)
-class Regret:
-    """Regrets of one policy from many states: of the finished runs, and how many ended early.
-
-    Attributes
-    ----------
-    median, p90, max : None where no run was finished
-    diverged, n : number of runs that ended early, and of all
-    """
-
-    median: float | None
-    p90: float | None
-    max: float | None
-    diverged: int
-    n: int
 
 
 @dataclass(frozen=True)
@@ -142,8 +125,8 @@ class GameOptimum(Reference):
 
     def verdict(self, regrets: Mapping[str, Regret] | None, runs: Mapping[str, RunMetrics]) -> str:
         """Return how much more than the optimum the two policies cost, as the median of all states."""
-        learned, linear = (None if regrets is None else regrets[name].median for name in TWO)
-        if learned is None or linear is None or not np.isfinite([learned, linear]).all():
+        learned, linear = (np.inf if regrets is None else regrets[name].median for name in TWO)
+        if not np.isfinite([learned, linear]).all():
             return "A run ended early, so there is no regret to compare."
         change = 100 * (learned - linear) / linear
         outcome = f"takes {-change:.0f} % off" if change < 0 else f"adds {change:.0f} % to"

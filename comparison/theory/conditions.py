@@ -11,8 +11,8 @@ from scipy.optimize import minimize
 
 from ...offline import Plant
 from ...online import Learner, draw_samples, rank_margin
-from ...online.rows import regressor_spectrum
-from ...online.vehicle import fixed_points
+from ...online.loop import fixed_points
+from ...online.paper import regressor_spectrum
 from ...symbolic import Setup, StationKeeping
 from ...symbolic.arrays import Array
 from ..optima import Bounds
@@ -34,7 +34,7 @@ def scenario_conditions(
     bounds : on ε and ε', from ideal weights, see `optima.load_ideal`
     c_lower : infimum over a run of (18)'s λ_min; that at the initial weights if None
     """
-    setup = scenario.station_keeping()
+    setup = scenario.setup()
     learner = Learner(
         setup.problem,
         setup.basis,

@@ -4,6 +4,7 @@ from .derivatives import PointDerivatives
 from .direct import DirectSolution, DirectSolver
 from .extremals import find_extremals
 from .newton import StructuredNewton
+from .quick import QuickValue
 from .refinement import Refined, input_errors, refine
 from .second_order import SecondOrder, second_order
 from .stage import Stage, against_control, against_disturbance, against_known, output_cost
@@ -14,6 +15,7 @@ __all__ = [
     "DirectSolver",
     "Optimum",
     "PointDerivatives",
+    "QuickValue",
     "Refined",
     "SecondOrder",
     "Stage",

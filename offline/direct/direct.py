@@ -9,12 +9,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Unpack
 
 import numpy as np
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
-from ..path import Grid, Plant, Trajectory, aligned_mesh, graded_mesh, reintegrate, sign_changes
+from ..path import Grid, MeshChanges, MeshSettings, Plant, Trajectory, reintegrate, settle
 from ..settings import Method
 from .derivatives import PointDerivatives
 from .guess import LinearStart
@@ -69,28 +70,24 @@ class DirectSolver:
     Parameters
     ----------
     problem : the game on its plant
-    horizon : T [s]; after it the cost is ζ(T)'P ζ(T)
-    n_intervals : K
-    degree : d, Radau points an interval
-    grading : about the logarithm of the ratio of the last to the first interval
+    settings : of the mesh and its Radau points
     method : "newton" where the plant has inverse dynamics, otherwise and as a safety net IPOPT; or
         "ipopt" always
+    changes : single settings of the mesh
     """
 
     def __init__(
         self,
         problem: Problem,
+        settings: MeshSettings = MeshSettings.direct,
         *,
-        horizon: float = 120.0,
-        n_intervals: int = 40,
-        degree: int = 5,
-        grading: float = 5.0,
         method: Method = "newton",
+        **changes: Unpack[MeshChanges],
     ) -> None:
         self.problem = problem
-        self.degree = degree
         self.plant = Plant(problem)
-        self.mesh = graded_mesh(horizon, n_intervals, grading)
+        settings = settings.changed(**changes)
+        self.mesh, self.degree = settings.points, settings.degree
         usable = method == "newton" and problem.inverse_dynamics is not None
         self._newton = StructuredNewton(problem) if usable else None
         self._start = LinearStart(problem)
@@ -155,26 +152,26 @@ class DirectSolver:
         changes, put mesh points on them, and repeat until they move by less than `tolerance` [s].
         Arguments and errors otherwise as of `solve`.
         """
+
+        def solve_on(mesh: Array, guess: Trajectory | None) -> DirectSolution:
+            return self.solve(zeta0, mesh=mesh, degree=degree, guess=guess, verify=False)
+
         base = self.mesh if mesh is None else mesh
-        solution = self.solve(zeta0, mesh=base, degree=degree, guess=guess, verify=False)
-        iterations, seconds = solution.iterations, solution.seconds
-        known = np.empty(0)
-        for _ in range(rounds):
-            events = sign_changes(self.plant, solution.trajectory)
-            if len(events) == len(known) and np.abs(events - known).max(initial=0.0) <= tolerance:
-                break
-            known = events
-            solution = self.solve(
-                zeta0,
-                mesh=aligned_mesh(base, events),
-                degree=degree,
-                guess=solution.trajectory,
-                verify=False,
-            )
-            iterations += solution.iterations
-            seconds += solution.seconds
-        solution = replace(solution, iterations=iterations, seconds=seconds)
-        return (self.verified(solution) if verify else solution), known
+        solutions, events = settle(
+            self.plant,
+            base,
+            solve_on(base, guess),
+            lambda solution: solution.trajectory,
+            lambda mesh, solution: solve_on(mesh, solution.trajectory),
+            tolerance=tolerance,
+            rounds=rounds,
+        )
+        solution = replace(
+            solutions[-1],
+            iterations=sum(each.iterations for each in solutions),
+            seconds=sum(each.seconds for each in solutions),
+        )
+        return (self.verified(solution) if verify else solution), events
 
     def verified(self, solution: DirectSolution) -> DirectSolution:
         """Return the solution with its defect and its value by re-integration."""

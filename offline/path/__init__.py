@@ -4,15 +4,21 @@ from .gauss import GaussRule
 from .grid import Bent, Grid, Pass, adjoint, backward
 from .interpolation import interpolate
 from .mesh import aligned_mesh, extended, graded_mesh, growing_mesh, halved
+from .mesh_settings import CLAIRVOYANT, GrowingMesh, MeshChanges, MeshSettings
 from .plant import Plant, Policy
 from .radau import RadauRule, radau_rule
+from .settling import settle
 from .trajectory import Trajectory
 from .verification import reintegrate, sign_changes
 
 __all__ = [
+    "CLAIRVOYANT",
     "Bent",
     "GaussRule",
     "Grid",
+    "GrowingMesh",
+    "MeshChanges",
+    "MeshSettings",
     "Pass",
     "Plant",
     "Policy",
@@ -28,5 +34,6 @@ __all__ = [
     "interpolate",
     "radau_rule",
     "reintegrate",
+    "settle",
     "sign_changes",
 ]

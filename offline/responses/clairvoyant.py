@@ -26,10 +26,9 @@ import numpy as np
 from ...symbolic import RunError
 from ...symbolic.arrays import Array
 from ..direct import PointDerivatives, SecondOrder, Stage, input_errors
-from ..path import Trajectory, growing_mesh, halved
+from ..path import CLAIRVOYANT, GrowingMesh, Trajectory, halved
 from .response import Guess, Responder, Response
 
-SHORTEST, LONGEST = 0.1, 1.0  # intervals of the first mesh [s]
 PATIENCE = 120  # iterations of one solve
 BUDGET = 250  # iterations after which no further start or mesh is tried, once there is an answer
 
@@ -93,7 +92,7 @@ class ClairvoyantSolver:
     R : (k, k) weight of the input, for the mesh
     horizon : T [s]
     breaks : times at which F is not smooth [s]
-    degree : d of the Radau collocation
+    mesh : the first, and d of the Radau collocation
     tolerance : relative change of the value at which refinement ends
     rounds : of refinement at most
     compiled : the derivatives, with the disturbance's own numbers in them
@@ -106,18 +105,18 @@ class ClairvoyantSolver:
         horizon: float,
         breaks: tuple[float, ...] = (),
         *,
-        degree: int = 5,
+        mesh: GrowingMesh = CLAIRVOYANT,
         tolerance: float = 1e-5,
         rounds: int = 5,
         compiled: bool = False,
     ) -> None:
         self.stage, self.R = stage, R
         self.tolerance, self.rounds = tolerance, rounds
-        self._mesh = growing_mesh(horizon, np.array(breaks), shortest=SHORTEST, longest=LONGEST)
+        self._mesh = mesh.points(horizon, np.array(breaks))
         derivatives = PointDerivatives(stage, compiled=compiled)
         self._coarse, self._fine = (
             Responder(stage, d, derivatives=derivatives, patience=PATIENCE)
-            for d in (degree, degree + 1)
+            for d in (mesh.degree, mesh.degree + 1)
         )
 
     def solve(self, zeta0: Array, policies: Iterable[Policy]) -> Clairvoyant:

@@ -14,7 +14,7 @@ import numpy as np
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import Stage
-from ..path import Plant, Policy, Trajectory, aligned_mesh, sign_changes
+from ..path import Plant, Policy, Trajectory, settle
 from .response import Guess, Responder, Response, Signal, perturbation, reintegrate_response
 
 ByInterval = Callable[[Array], Array]
@@ -75,17 +75,24 @@ class Disturber:
         RunError
             If there is none, or it has run off.
         """
-        response = self.respond(zeta0, mesh, guesses, parameters)
-        starts, iterations, known = response.starts, response.iterations, np.empty(0)
-        for _ in range(rounds):
-            events = sign_changes(self._plant, response.path)
-            if len(events) == len(known) and np.abs(events - known).max(initial=0.0) <= 1e-6:
-                break
-            known, points = events, aligned_mesh(mesh, events, fixed=fixed)
-            guess = response.path.sample(self.times(points))
-            response = self.respond(zeta0, points, [guess], parameters)
-            iterations += response.iterations
-        return replace(response, starts=starts, iterations=iterations)
+
+        def solve_on(mesh: Array, before: Response) -> Response:
+            return self.respond(zeta0, mesh, [before.path.sample(self.times(mesh))], parameters)
+
+        responses, _ = settle(
+            self._plant,
+            mesh,
+            self.respond(zeta0, mesh, guesses, parameters),
+            lambda response: response.path,
+            solve_on,
+            fixed=fixed,
+            rounds=rounds,
+        )
+        return replace(
+            responses[-1],
+            starts=responses[0].starts,
+            iterations=sum(response.iterations for response in responses),
+        )
 
     def respond(
         self, zeta0: Array, mesh: Array, guesses: Iterable[Guess], parameters: ByInterval

@@ -19,6 +19,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import chain
+from typing import Unpack
 
 import numpy as np
 from casadi import SX
@@ -26,7 +27,7 @@ from casadi import SX
 from ...symbolic import Basis, InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import against_control
-from ..path import Trajectory, aligned_mesh, graded_mesh
+from ..path import MeshChanges, MeshSettings, Trajectory, aligned_mesh
 from .disturber import Disturber
 from .policy import learned_policy
 from .worst_case import WorstCase, measured, unbounded
@@ -88,31 +89,30 @@ class ScheduledWorstCase:
     Parameters
     ----------
     problem, basis : of the policy
-    horizon : T [s]
-    n_intervals, degree, grading : of the Radau mesh before the jumps are put in
+    settings : of the mesh, before the jumps are put in, and its Radau points
     starts, seed, reach : as for `WorstCaseSolver`
+    changes : single settings of the mesh
     """
 
     def __init__(
         self,
         problem: Problem,
         basis: Basis,
+        settings: MeshSettings = MeshSettings.direct,
         *,
-        horizon: float = 120.0,
-        n_intervals: int = 40,
-        degree: int = 5,
-        grading: float = 5.0,
         starts: int = 2,
         seed: int = 0,
         reach: float = 4.0,
+        **changes: Unpack[MeshChanges],
     ) -> None:
         self.problem, self.basis = problem, basis
-        self._mesh = graded_mesh(horizon, n_intervals, grading)
+        settings = settings.changed(**changes)
+        self._mesh = settings.points
         weights = SX.sym("weights", basis.n_basis)
         policy = learned_policy(problem, basis, weights)
         stage = against_control(problem, policy, weights, problem.P)
         self._disturber = Disturber(
-            problem, stage, degree, starts=starts, seed=seed, reach=reach, patience=40
+            problem, stage, settings.degree, starts=starts, seed=seed, reach=reach, patience=40
         )
 
     def solve(

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from typing import Unpack
 
 import numpy as np
 from casadi import SX
@@ -27,7 +28,7 @@ from casadi import SX
 from ...symbolic import RunError
 from ...symbolic.arrays import Array
 from ..direct import SecondOrder, against_control
-from ..path import Trajectory, graded_mesh
+from ..path import MeshChanges, MeshSettings, Trajectory
 from .disturber import ByInterval, Disturber
 from .policy import ControlPolicy
 from .response import Response
@@ -76,38 +77,41 @@ class WorstCaseSolver:
     Parameters
     ----------
     policy : the control policy on the plant of its game
-    horizon : T [s]
-    n_intervals, degree, grading : of the Radau mesh, as for the direct solver
+    settings : of the mesh and its Radau points, as for the direct solver
     starts : perturbed starts, beside no disturbance and the linear worst case
     seed : of the perturbations
     reach : excursion that counts as having run off, in half-widths, or in multiples of the initial
         state where that lies outside
+    changes : single settings of the mesh
     """
 
     def __init__(
         self,
         policy: ControlPolicy,
+        settings: MeshSettings = MeshSettings.direct,
         *,
-        horizon: float = 120.0,
-        n_intervals: int = 40,
-        degree: int = 5,
-        grading: float = 5.0,
         starts: int = 2,
         seed: int = 0,
         reach: float = 4.0,
+        **changes: Unpack[MeshChanges],
     ) -> None:
         self.policy, self.problem = policy, policy.problem
+        short = settings.changed(**changes)
         # the graded mesh of twice the horizon keeps its first intervals with log(2) more grading
-        more = np.log(2.0) if grading > 0.0 else 0.0
-        self._meshes = (
-            graded_mesh(horizon, n_intervals, grading),
-            graded_mesh(2.0 * horizon, 2 * n_intervals, grading + more),
+        long = MeshSettings(
+            horizon=2.0 * short.horizon,
+            n_intervals=2 * short.n_intervals,
+            degree=short.degree,
+            grading=short.grading + (np.log(2.0) if short.grading > 0.0 else 0.0),
         )
+        self._meshes = short.points, long.points
         self._level = float(self.problem.game.gamma**2)
         X, n = policy.bounded_real(self.problem.game.gamma), self.problem.n_states
         level, rest = SX.sym("level"), np.zeros((n, n)) if X is None else X
         stage = against_control(self.problem, policy.u_control, level, rest, level)
-        self._disturber = Disturber(self.problem, stage, degree, starts=starts, seed=seed, reach=reach)
+        self._disturber = Disturber(
+            self.problem, stage, short.degree, starts=starts, seed=seed, reach=reach
+        )
 
     def solve(self, zeta0: Array) -> WorstCase:
         """Return the worst case from `zeta0`, or that there is none and why.

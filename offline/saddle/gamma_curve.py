@@ -19,6 +19,7 @@ import numpy as np
 from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ...symbolic.game import gamma_threshold
+from ..path import MeshSettings
 from .saddle import SaddleSolution, SaddleSolver
 
 # time constants of the slowest mode within the horizon; what is left is of third order, e^-30
@@ -95,7 +96,7 @@ class GammaCurveSolver:
         problem: Problem,
         gammas: Sequence[float] | None = None,
         *,
-        horizon: float = 120.0,
+        horizon: float = MeshSettings.saddle.horizon,
         compiled: bool = True,
     ) -> None:
         self.problem = problem
@@ -127,7 +128,7 @@ class GammaCurveSolver:
     ) -> tuple[GammaPoint, SaddleSolution | None]:
         problem = solver.problem
         gamma, linear = float(problem.game.gamma), float(zeta0 @ problem.P @ zeta0)
-        slow = solver.with_horizon(max(float(solver.mesh[-1]), HORIZON / problem.decay_rate))
+        slow = solver.with_horizon(max(solver.settings.horizon, HORIZON / problem.decay_rate))
         try:
             solution, _ = slow.solve_aligned(zeta0, start=start)
         except RunError as error:

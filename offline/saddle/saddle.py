@@ -12,12 +12,13 @@ from __future__ import annotations
 import copy
 import time
 from dataclasses import dataclass, replace
+from typing import Unpack
 
 import numpy as np
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
-from ..path import GaussRule, Plant, aligned_mesh, graded_mesh, interpolate, sign_changes
+from ..path import GaussRule, MeshChanges, MeshSettings, Plant, interpolate, settle
 from .boundary import BoundaryProblem, Unknowns
 from .extremal_field import ExtremalField
 
@@ -82,25 +83,23 @@ class SaddleSolver:
     Parameters
     ----------
     problem : the game on its plant; γ may be infinite
-    horizon : T [s]
-    n_intervals, degree, grading : of the Gauss collocation; not those of the direct solver
+    settings : of the mesh and its Gauss points; not those of the direct solver
     compiled : False uses CasADi's virtual machine even where a C compiler exists
+    changes : single settings of the mesh
     """
 
     def __init__(
         self,
         problem: Problem,
+        settings: MeshSettings = MeshSettings.saddle,
         *,
-        horizon: float = 120.0,
-        n_intervals: int = 30,
-        degree: int = 6,
-        grading: float = 6.0,
         compiled: bool = True,
+        **changes: Unpack[MeshChanges],
     ) -> None:
         self.problem = problem
-        self.rule = GaussRule(degree)
-        self.mesh = graded_mesh(horizon, n_intervals, grading)
-        self._grading = grading
+        self.settings = settings.changed(**changes)
+        self.rule = GaussRule(self.settings.degree)
+        self.mesh = self.settings.points
         self.plant = Plant(problem)
         self._field = ExtremalField(problem, compiled=compiled)
         self._boundary = BoundaryProblem(problem, self._field, self.rule)
@@ -121,13 +120,8 @@ class SaddleSolver:
     def with_horizon(self, horizon: float) -> SaddleSolver:
         """Return the solver of the same problem with a longer T [s], its first intervals about kept."""
         other = copy.copy(self)
-        longer = horizon / float(self.mesh[-1])
-        other._grading, more = 0.0, longer
-        if self._grading > 0.0:
-            other._grading = self._grading + float(np.log(longer))
-            more = min(other._grading / self._grading, longer)
-        n_intervals = int(np.ceil(more * (len(self.mesh) - 1)))
-        other.mesh = graded_mesh(horizon, n_intervals, other._grading)
+        other.settings = self.settings.lengthened(horizon)
+        other.mesh = other.settings.points
         return other
 
     def solve(
@@ -166,18 +160,21 @@ class SaddleSolver:
         The sign changes are those of its own trajectory: solve, locate them, put mesh points on them,
         and repeat until they move by less than `tolerance` [s]. Raises as `solve`.
         """
-        solution = self.solve(zeta0, start=start)
-        iterations, seconds = solution.iterations, solution.seconds
-        known = np.empty(0)
-        for _ in range(rounds):
-            events = sign_changes(self.plant, solution)
-            if len(events) == len(known) and np.abs(events - known).max(initial=0.0) <= tolerance:
-                break
-            known = events
-            solution = self.solve(zeta0, mesh=aligned_mesh(self.mesh, events), start=solution)
-            iterations += solution.iterations
-            seconds += solution.seconds
-        return replace(solution, iterations=iterations, seconds=seconds), known
+        solutions, events = settle(
+            self.plant,
+            self.mesh,
+            self.solve(zeta0, start=start),
+            lambda solution: solution,
+            lambda mesh, solution: self.solve(zeta0, mesh=mesh, start=solution),
+            tolerance=tolerance,
+            rounds=rounds,
+        )
+        solution = replace(
+            solutions[-1],
+            iterations=sum(each.iterations for each in solutions),
+            seconds=sum(each.seconds for each in solutions),
+        )
+        return solution, events
 
     def _continued(self, zeta0: Array, mesh: Array) -> tuple[Unknowns, int]:
         """Follow the solution from rest to `zeta0`, in one step if it can be."""

@@ -4,6 +4,7 @@ from .domain import Bound, require_numbers
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import InverseDynamics, Problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
+from .stored import problem_from_data, problem_to_data
 
 __all__ = [
     "Bound",
@@ -14,6 +15,8 @@ __all__ = [
     "gamma_hamiltonian",
     "gamma_star",
     "gamma_threshold",
+    "problem_from_data",
+    "problem_to_data",
     "require_numbers",
     "stabilising_solution",
     "weight_matrix",
