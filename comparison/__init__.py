@@ -1,7 +1,22 @@
 """Comparison of the learned policy with the offline optimum."""
 
+from .adapters import export
 from .compare import Study, compare
-from .scenario import Scenario
+from .records import Replay, replay
+from .scenario import Scenario, generate
+from .sweep import Swept, sweep
 from .theory import Condition, check
 
-__all__ = ["Condition", "Scenario", "Study", "check", "compare"]
+__all__ = [
+    "Condition",
+    "Replay",
+    "Scenario",
+    "Study",
+    "Swept",
+    "check",
+    "compare",
+    "export",
+    "generate",
+    "replay",
+    "sweep",
+]

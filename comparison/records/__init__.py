@@ -3,10 +3,10 @@
 from .clairvoyant import KIND, clairvoyant_record, optimum_name
 from .recorded import recorded_scenario
 from .replay import BIT_EQUAL, DIFFERENT, Replay, replay
+from .running import closed_loop
 from .runs import (
     FORMAT,
     OFFLINE_KEY,
-    closed_loop,
     contender_record,
     model_text,
     online_record,

@@ -9,23 +9,18 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from ...offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
 from ...online import (
-    History,
-    LearnedPolicy,
-    Policy,
-    VehiclePolicy,
     load,
-    run,
     save,
     to_dataset,
 )
-from ...online.loop import ProblemSystem, Progress, drive
+from ...online.loop import Progress
 from ...online.records import listed, versions
 from ...symbolic import InputError, RunError, Setup, StationKeeping
 from ...symbolic.arrays import Array
@@ -33,6 +28,7 @@ from ...symbolic.game import problem_to_data
 from ..policies import AnyPolicy, contender
 from ..scenario import Scenario
 from .record_files import with_files
+from .running import closed_loop
 
 FORMAT = 8  # of the records; raise it when what is in them, or how a run is made, changes
 OFFLINE_KEY = {"vehicle", "problem", "current", "game", "envelope", "offline"}
@@ -113,20 +109,6 @@ def online_record(
     if str(record.attrs["stopped"]).startswith("interrupted"):
         raise KeyboardInterrupt  # the part that was run is kept
     return record
-
-
-def closed_loop(
-    scenario: Scenario, policy: AnyPolicy | None = None, progress: Progress | None = None
-) -> History:
-    """Run a scenario of a vehicle or of a problem, with its own learner unless a policy is given."""
-    if scenario.problem is None:
-        return run(scenario, cast("VehiclePolicy | None", policy), progress)
-    setup = scenario.setup()
-    start = tuple(scenario.initial_state.tolist())
-    settings = scenario.simulation.model_copy(update={"initial_state": start})
-    system = ProblemSystem(setup.problem, settings, compiled=setup.compiled)
-    driven = LearnedPolicy(scenario) if policy is None else cast("Policy", policy)
-    return drive(system, driven, scenario, progress)
 
 
 def contender_record(
