@@ -87,8 +87,8 @@ def draw_field(page: Page, analysis: xr.Dataset, moving: str) -> None:
     rows, columns = (str(analysis.attrs[f"field_{side}"]) for side in ("rows", "columns"))
     fields = {name: np.abs(analysis[f"field_{name}"].values) for name in ("linear", "learned")}
     both = np.concatenate([values.ravel() for values in fields.values()])
-    low = max(float(np.quantile(both, 0.02)), 1e-12)
-    norm = LogNorm(low, max(float(both.max()), 10.0 * low))
+    low = max(float(np.nanquantile(both, 0.02)), 1e-12)  # NaN at the origin itself
+    norm = LogNorm(low, max(float(np.nanmax(both)), 10.0 * low))
     moment = float(analysis.attrs["field_time"])
     title = f"Bellman error around the {moving} at t = {moment:.1f} s"
     with page.figure("field", title, 1, 2, 4.0) as panels:

@@ -198,14 +198,11 @@ def _around(setup: Setup, learned: xr.Dataset, field: Field) -> xr.Dataset:
     weights = {"linear": (setup.riccati_weights,) * 3}
     in_use = [weights_in_use(learned, n, time[[moment]])[0] for n in ("critic", "actor_1", "actor_2")]
     weights["learned"] = (in_use[0], in_use[1], in_use[2])
-    data: dict[str, Any] = {
-        f"field_{name}": (
-            ("row", "column"),
-            (bellman_error(terms, setup.game, *three).delta / terms.state_cost).reshape(N_SIDE, N_SIDE),
-            {"units": "1"},
-        )
-        for name, three in weights.items()
-    }
+    size = np.where(terms.state_cost > 0.0, terms.state_cost, np.nan)  # NaN at the origin
+    data: dict[str, Any] = {}
+    for name, three in weights.items():
+        relative = bellman_error(terms, setup.game, *three).delta / size
+        data[f"field_{name}"] = (("row", "column"), relative.reshape(N_SIDE, N_SIDE), {"units": "1"})
     attributes: dict[str, Any] = {"field_time": float(time[moment])}
     for side, i in (("rows", field.rows), ("columns", field.columns)):
         name, unit = setup.problem.state_names[i], setup.problem.state_units[i]
