@@ -20,9 +20,8 @@ def compare_options(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--field",
-        default="x,y",
         metavar="STATE,STATE",
-        help="draw the Bellman error over these two states (default: x,y)",
+        help="draw the Bellman error over these two states (default: the first two, x,y)",
     )
     command.add_argument(
         "--animation",

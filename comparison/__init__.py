@@ -1,17 +1,17 @@
 """Comparison of the learned policy with the offline optimum."""
 
 from .adapters import export
+from .compare import Study, compare
 from .records import Replay, replay
 from .scenario import Scenario, generate
-from .study import Comparison, compare
 from .sweep import Swept, sweep
 from .theory import Condition, check
 
 __all__ = [
-    "Comparison",
     "Condition",
     "Replay",
     "Scenario",
+    "Study",
     "Swept",
     "check",
     "compare",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_are
 from scipy.spatial.transform import Rotation
-from stationkeep.comparison.report.figures import wrench_limits
+from stationkeep.comparison.report.vehicle_figures import wrench_limits
 from stationkeep.symbolic import StationKeeping, Thrusters, Vehicle
 
 from .games import Array, linear_on, quick_scenario

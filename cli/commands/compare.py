@@ -7,23 +7,18 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from ...comparison import Comparison, compare
+from ...comparison import Study, compare
+from ...comparison.compare import require_film
 from ...comparison.parallel import default_workers
 from ...comparison.report import (
     CLAIRVOYANT_CHECK,
-    REGRET_OF_A_RUN,
-    Page,
     certificate,
     clairvoyant_check,
-    draw_all,
     summary,
     too_short,
-    verdict,
-    write_report,
 )
-from ...comparison.study import Field, Plan
 from ...symbolic import InputError
-from ..output import Tell, load_scenario, output_folder, print_json, print_table, progress
+from ..output import load_scenario, output_folder, print_json, print_table, progress
 
 
 def run(options: argparse.Namespace) -> int:
@@ -32,68 +27,65 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(f"--n-states is {options.n_states}, but must be at least 1")
     if options.workers is not None and options.workers < 1:
         raise InputError(f"--workers is {options.workers}, but must be at least 1")
-    plan = Plan(load_scenario(options), options.n_states, Field.of(options.field))
+    scenario = load_scenario(options)
+    if options.animation:
+        require_film(scenario)
     folder = output_folder(options)
-    n_workers = options.workers or default_workers()
-    pages = (Page(folder / "figures"), Page(None))
     with progress(options) as tell:
-        comparison = compare(plan, folder / "records", n_workers=n_workers, tell=tell)
-        for i, page in enumerate(pages):
-            tell("figures", i / len(pages))
-            draw_all(comparison, page)
-        tell("report", 0.0)
-        film = _film(options, comparison, folder / "figures", tell)
-        report = write_report(folder / "report.html", comparison, *pages, _commands(options))
+        study = compare(
+            scenario,
+            states=options.n_states,
+            out=folder,
+            field=options.field,
+            workers=options.workers or default_workers(),
+            tell=tell,
+        )
+        report = study.write_report(_commands(options), tell)
+        film = None
+        if options.animation:
+            tell("animation", 0.0)
+            film = study.animate()
     if options.json:
-        print_json(_answer(comparison, pages[0].files, report) | {"animation": film})
+        print_json(_answer(study, report) | {"animation": film})
     else:
-        _print(comparison, report)
+        _print(study, report)
         if film is not None:
             print(f"animation: {film}")
-    return 1 if comparison.faults else 0
+    return 1 if study.faults else 0
 
 
-def _film(options: argparse.Namespace, comparison: Comparison, folder: Path, tell: Tell) -> Path | None:
-    """Write the film of the learned run beside the optimum, if it is asked for."""
-    if not options.animation:
-        return None
-    from ...comparison.report import animate
-
-    tell("animation", 0.0)
-    return animate(folder, comparison.records["learned"], comparison.reference)
-
-
-def _answer(comparison: Comparison, figures: dict[str, Path], report: Path) -> dict[str, Any]:
-    regret: dict[str, Any] = dict.fromkeys(comparison.metrics)
-    if comparison.regret is not None:
-        regret |= {name: one.as_json() for name, one in comparison.regret.items()}
+def _answer(study: Study, report: Path) -> dict[str, Any]:
+    regret: dict[str, Any] = dict.fromkeys(study.metrics)
+    if study.regret is not None:
+        regret = {name: sizes.as_json() for name, sizes in study.regret.items()}
     answer: dict[str, Any] = {
         "regret": regret,
-        "envelope_scale": comparison.scenario.envelope.scale,
-        "n_states": comparison.n_states,
-        "value": float(comparison.optimal.attrs["value"]),
-        "value_error": comparison.value_error,
-        "figures": figures,
+        "envelope_scale": study.scenario.envelope.scale,
+        "n_states": study.n_states,
+        "value": float(study.optimal.attrs["value"]),
+        "value_error": study.value_error,
+        "figures": study.figures,
         "report": report,
-        "faults": comparison.faults,
+        "faults": study.faults,
+        "verdict": study.verdict,
     }
     notes = {}
-    if comparison.disturbed:
-        answer["dissipation_margin"] = comparison.margins
-        answer["clairvoyant"] = _clairvoyant(comparison)
-        notes["regret"] = REGRET_OF_A_RUN
-    if comparison.regret is None:
-        notes["regret"] = notes["clairvoyant"] = verdict(comparison)
-    elif comparison.too_short:
-        notes["regret"] = too_short(comparison)
+    if study.reference.note is not None:  # runs are held against something else than the game
+        answer["dissipation_margin"] = study.margins
+        answer[study.reference.kind] = _other_optimum(study)
+        notes["regret"] = study.reference.note
+    if study.regret is None:
+        notes["regret"] = notes[study.reference.kind] = study.verdict
+    elif study.too_short:
+        notes["regret"] = too_short(study)
     return answer | {"notes": notes}
 
 
-def _clairvoyant(comparison: Comparison) -> dict[str, Any] | None:
+def _other_optimum(study: Study) -> dict[str, Any] | None:
     """Return value, errors and effort of the clairvoyant optimum, None where there is none."""
-    if comparison.clairvoyant is None:
+    if study.reference.record is None:
         return None
-    attributes = comparison.clairvoyant.attrs
+    attributes = study.reference.record.attrs
     names = ("value", *CLAIRVOYANT_CHECK, "rounds", "intervals", "iterations", "seconds")
     numbers = {name: attributes[name].item() for name in names}
     return {name: None if number != number else number for name, number in numbers.items()}
@@ -109,14 +101,14 @@ def _commands(options: argparse.Namespace) -> list[str]:
     ]
 
 
-def _print(comparison: Comparison, report: Path) -> None:
-    print_table("Learned beside optimal", *summary(comparison))
-    print_table("Certificate of the optimum", *certificate(comparison))
-    if comparison.clairvoyant is not None:
-        print_table("Check of the clairvoyant optimum", *clairvoyant_check(comparison.clairvoyant))
-    print(verdict(comparison))
-    if comparison.regret is not None and comparison.too_short:
-        print(too_short(comparison))
-    for fault in comparison.faults:
+def _print(study: Study, report: Path) -> None:
+    print_table("Learned beside optimal", *summary(study))
+    print_table("Certificate of the optimum", *certificate(study))
+    if study.shown is not study.optimal:
+        print_table("Check of the clairvoyant optimum", *clairvoyant_check(study.shown))
+    print(study.verdict)
+    if study.regret is not None and study.too_short:
+        print(too_short(study))
+    for fault in study.faults:
         print(f"did not converge: {fault}")
     print(f"report: {report}")

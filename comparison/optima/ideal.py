@@ -116,7 +116,7 @@ def envelope_states(envelope: Array, n_states: int, seed: int, stream: int) -> A
 
 def require_numbers(scenario: Scenario, n_states: int, held_out: int) -> None:
     """Raise InputError unless there are enough states for the basis, and some held out."""
-    basis = scenario.station_keeping().basis
+    basis = scenario.setup().basis
     if n_states < least_states(basis):
         raise InputError(
             f"--ideal-weights is {n_states}, but the {basis.n_basis} weights of basis '{basis.name}' "
@@ -175,7 +175,7 @@ def effort(setup: Setup, states: Array, gradients: Array) -> Array:
 
 def ideal_record(scenario: Scenario, found: Fit, training: Pairs, held_out: Pairs) -> xr.Dataset:
     """Return the record of ideal weights: what the learner, `compare` and `check` start from."""
-    setup = scenario.station_keeping()
+    setup = scenario.setup()
     units = {"units": unit_text(setup.problem.state_units)}
     epsilon, epsilon_prime = representation_errors(setup.basis, found.weights, held_out)
     gradient = {"units": "cost per unit of the state"}

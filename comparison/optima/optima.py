@@ -69,7 +69,7 @@ class Optima:
             remove_temporaries(self.folder, "optimal-*.nc")
 
     def _solve(self, n_workers: int, progress: Progress) -> dict[int, str]:
-        half_widths = self.scenario.station_keeping().half_widths
+        half_widths = self.scenario.setup().half_widths
         chunks = plan(self.states, half_widths)
         tasks: list[Chunk] = [[(step, self.states[step.state]) for step in chunk] for chunk in chunks]
         done, solved = np.zeros(len(self.states), dtype=bool), 0
@@ -89,7 +89,7 @@ class Optima:
 
     def rows(self, given_up: dict[int, str]) -> Iterator[dict[str, Any]]:
         """Yield what is told of each state, in their order, read from the records one by one."""
-        problem = self.scenario.station_keeping().problem
+        problem = self.scenario.setup().problem
         plant = Plant(problem)
         for state, zeta in enumerate(self.states):
             if state in given_up:
@@ -137,7 +137,7 @@ def _failure(zeta: Array, reason: str, seconds: float | None) -> dict[str, Any]:
 def _worker(shipment: tuple[Scenario, Path]) -> Work[Chunk, tuple[int, bool]]:
     """Build the solver once; return what solves a chunk, telling each state and whether it was new."""
     scenario, folder = shipment
-    solver = OfflineSolver(scenario.station_keeping().problem, scenario.offline)
+    solver = OfflineSolver(scenario.setup().problem, scenario.offline)
 
     def work(chunk: Chunk) -> Iterator[tuple[int, bool]]:
         before = {step.state: step.after for step, _ in chunk}

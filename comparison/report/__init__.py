@@ -4,20 +4,11 @@ from .animation import animate
 from .figures import draw_all
 from .gamma_figure import draw_gamma_curves
 from .report import write_report
-from .report_tables import (
-    CLAIRVOYANT_CHECK,
-    REGRET_OF_A_RUN,
-    certificate,
-    clairvoyant_check,
-    summary,
-    too_short,
-    verdict,
-)
+from .report_tables import CLAIRVOYANT_CHECK, certificate, clairvoyant_check, summary, too_short
 from .style import Page
 
 __all__ = [
     "CLAIRVOYANT_CHECK",
-    "REGRET_OF_A_RUN",
     "Page",
     "animate",
     "certificate",
@@ -26,6 +17,5 @@ __all__ = [
     "draw_gamma_curves",
     "summary",
     "too_short",
-    "verdict",
     "write_report",
 ]

@@ -1,160 +1,115 @@
-"""The figures of a comparison, one message a figure; here those of the way back to the station."""
+"""The figures of a comparison, one message a figure; here states and controls of any problem."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from scipy.optimize import linprog
 
-from ...symbolic import RunError, StationKeeping, Thrusters
+from ...symbolic import StationKeeping
+from ...symbolic.arrays import Array
 from ..records import optimum_name
-from ..study import Comparison
+from ..study import Comparison, quantity, subject
 from .learning_figures import draw_bellman, draw_errors, draw_excitation, draw_field, draw_weights
 from .monitor_figure import draw_monitor
-from .path_figure import draw_path
-from .style import LEARNED, OPTIMAL, Page, legend_above, legend_below, line_color, time_axis
-from .verdict_figures import draw_cost, draw_energy, draw_regrets
+from .style import Page, line_color, pair, time_axis
+from .vehicle_figures import draw_details, draw_effort, draw_way
+from .verdict_figures import draw_cost, draw_regrets
 
-Panel = tuple[str, float]
-_POSE: list[Panel] = [
-    ("x [m]", 1.0),
-    ("y [m]", 1.0),
-    ("z, down [m]", 1.0),
-    ("roll φ [deg]", np.degrees(1.0)),
-    ("pitch θ [deg]", np.degrees(1.0)),
-    ("yaw ψ [deg]", np.degrees(1.0)),
-]
-_RATES: list[Panel] = [
-    ("ẋ [m/s]", 1.0),
-    ("ẏ [m/s]", 1.0),
-    ("ż [m/s]", 1.0),
-    ("φ̇ [deg/s]", np.degrees(1.0)),
-    ("θ̇ [deg/s]", np.degrees(1.0)),
-    ("ψ̇ [deg/s]", np.degrees(1.0)),
-]
-_BODY = ["surge X [N]", "sway Y [N]", "heave Z [N]", "roll K [N m]", "pitch M [N m]", "yaw N [N m]"]
-_EARTH = ["along x [N]", "along y [N]", "along z [N]", "for φ [N m]", "for θ [N m]", "for ψ [N m]"]
+LARGEST = 6  # lines of one colour each in a panel
 
 
 def draw_all(comparison: Comparison, page: Page) -> None:
     """Draw every figure of a comparison on `page`, in the order in which a report shows them."""
-    station, optimal, records = comparison.station, comparison.reference, comparison.records
-    learned = records["learned"]
+    setup, learned = comparison.setup, comparison.records["learned"]
+    analysis, moving = comparison.analysis, subject(comparison.setup)
+    station = setup if isinstance(setup, StationKeeping) else None
     if comparison.regret is not None:
         draw_regrets(page, comparison)
-    draw_energy(page, comparison)
-    draw_path(page, records, optimal)
-    draw_states(page, learned, optimal)
+    if station is None:
+        draw_states(page, comparison)
+    else:
+        draw_way(page, comparison)
     draw_cost(page, comparison)
-    draw_forces(page, learned, optimal, station, body=True)
-    thrusters = station.model.vehicle.thrusters
-    if thrusters is not None:
-        draw_thrusters(page, learned, optimal, thrusters)
-    draw_errors(page, comparison.analysis)
-    draw_weights(page, learned, station.riccati_weights, comparison.analysis)
+    if station is None:
+        draw_controls(page, comparison)
+    else:
+        draw_effort(page, comparison, station)
+    draw_errors(page, analysis, moving)
+    draw_weights(page, learned, setup.riccati_weights, analysis)
     draw_bellman(page, learned, comparison.scenario.learner.error)
     draw_monitor(page, learned, comparison.theory)
-    draw_field(page, comparison.analysis)
+    if "field_learned" in analysis:
+        draw_field(page, analysis, moving)
     draw_excitation(page, comparison.excitation)
-    draw_states(page, learned, optimal, rates=True)
-    draw_forces(page, learned, optimal, station, body=False)
+    if station is not None:
+        draw_details(page, comparison, station)
 
 
-def draw_states(page: Page, learned: xr.Dataset, optimal: xr.Dataset, *, rates: bool = False) -> None:
-    """Draw pose, or its rates, against time: learned beside optimal, or beside clairvoyant."""
-    name, title = ("rates", "Rates") if rates else ("states", "Pose")
-    first = 6 if rates else 0
-    end = float(learned["time"][-1])
-    with page.figure(name, f"{title}: learned beside {optimum_name(optimal)}", 2, 3, 5.2) as panels:
-        for i, (axes, (label, unit)) in enumerate(zip(panels, _RATES if rates else _POSE, strict=True)):
-            for record, color, run, style in _pair(learned, optimal):
-                values = unit * record["zeta"].values[:, first + i]
-                axes.plot(record["time"], values, style, color=color, label=run)
-            time_axis(axes, end)
-            axes.set_title(label)
-        legend_above(panels[0])
+def draw_states(page: Page, comparison: Comparison) -> None:
+    """Draw all states against time, a panel for each unit: learned beside the optimum."""
+    problem, learned = comparison.setup.problem, comparison.records["learned"]
+    runs = {style: (run["time"].values, run["zeta"].values) for run, style in _both(comparison)}
+    title = f"States: learned (solid) beside {optimum_name(comparison.shown)} (dashed)"
+    labels = list(zip(problem.state_names, problem.state_units, strict=True))
+    draw_lines(page, "states", title, labels, runs, float(learned["time"][-1]))
 
 
-def draw_forces(
-    page: Page, learned: xr.Dataset, optimal: xr.Dataset, station: StationKeeping, *, body: bool
-) -> None:
-    """Draw the control against time, in the body frame with what the thrusters can give, or in the
-    earth frame, where R of the cost is constant.
-    """
-    title = (
-        "Body wrench τ_b (in brackets: what the thrusters can give)"
-        if body
-        else "Earth-frame control u₁, which R of the cost weighs"
-    )
-    variable = "tau_b" if body else "u_control"
-    thrusters = station.model.vehicle.thrusters
-    end = float(learned["time"][-1])
-    with page.figure("forces_body" if body else "forces_earth", title, 2, 3, 5.2) as panels:
-        for i, (axes, label) in enumerate(zip(panels, _BODY if body else _EARTH, strict=True)):
-            for record, color, name, style in _pair(learned, optimal):
-                time = record["time"] if record is learned else record["node"]
-                axes.plot(time, record[variable].values[:, i], style, color=color, label=name)
-            if body and thrusters is not None:
-                label += _mark_limits(axes, *wrench_limits(thrusters, i))
-            axes.set_title(label)
-            time_axis(axes, end)
-        legend_above(panels[0])
-
-
-def draw_thrusters(page: Page, learned: xr.Dataset, optimal: xr.Dataset, thrusters: Thrusters) -> None:
-    """Draw the thrust of every thruster, least-norm allocation, with its limits."""
-    end = float(learned["time"][-1])
+def draw_controls(page: Page, comparison: Comparison) -> None:
+    """Draw all inputs of the control against time, as `draw_states` does."""
+    problem, learned = comparison.setup.problem, comparison.records["learned"]
     runs = {
-        name: (
-            record["time" if record is learned else "node"],
-            thrusters.thrust(record["tau_b"].values),
-        )
-        for record, _, name, _ in _pair(learned, optimal)
+        style: (run["time" if run is learned else "node"].values, run["u_control"].values)
+        for run, style in _both(comparison)
     }
-    reverse, forward = thrusters.limits
-    share = max(float(np.maximum(t / forward, t / reverse).max()) for _, t in runs.values())
-    title = f"Thrust: at most {share:.0%} of a thruster's limit is asked for"
-    with page.figure("thrusters", title, 1, 2, 3.6) as panels:
-        for axes, (name, (time, thrust)) in zip(panels, runs.items(), strict=True):
-            for i, column in enumerate(thrust.T):
-                axes.plot(time, column, color=line_color(i), lw=1.2, label=f"{i + 1}")
-            axes.set_title(f"{name}: thrust [N]" + _mark_limits(axes, reverse, forward))
-            time_axis(axes, end)
-        legend_below(panels[0], columns=8, title="thruster")
+    title = f"Control u₁: learned (solid) beside {optimum_name(comparison.shown)} (dashed)"
+    labels = list(zip(problem.input_names, problem.input_units, strict=True))
+    draw_lines(page, "controls", title, labels, runs, float(learned["time"][-1]))
 
 
-def wrench_limits(thrusters: Thrusters, axis: int) -> tuple[float, float]:
-    """Return the least and largest body force on one axis alone, the others zero [N or N m]."""
-    allocation = thrusters.matrix
-    unit = np.zeros(6)
-    unit[axis] = 1.0
-    bounds: Sequence[tuple[float | None, float | None]] = [
-        *[thrusters.limits] * allocation.shape[1],
-        (None, None),
+def _both(comparison: Comparison) -> list[tuple[xr.Dataset, str]]:
+    return [
+        (record, style) for record, _, _, style in pair(comparison.records["learned"], comparison.shown)
     ]
-    equations = np.column_stack([allocation, -unit])
-    extremes = []
-    for sign in (1.0, -1.0):
-        cost = np.zeros(equations.shape[1])
-        cost[-1] = sign
-        answer = linprog(cost, A_eq=equations, b_eq=np.zeros(6), bounds=bounds)
-        if answer.x is None:
-            raise RunError(f"the wrench limits were not found ({answer.message})")
-        extremes.append(float(answer.x[-1]))
-    return extremes[0], extremes[1]
 
 
-def _pair(learned: xr.Dataset, optimal: xr.Dataset) -> list[tuple[xr.Dataset, str, str, str]]:
-    return [(learned, LEARNED, "learned", "-"), (optimal, OPTIMAL, optimum_name(optimal), "--")]
+def draw_lines(
+    page: Page,
+    name: str,
+    title: str,
+    labels: Sequence[tuple[str, str]],
+    runs: Mapping[str, tuple[Array, Array]],
+    end: float,
+) -> None:
+    """Draw columns of numbers against time, those of one unit in a panel, at most six.
+
+    Parameters
+    ----------
+    labels : name and unit of each column
+    runs : times (T,) and numbers (T, columns) by the style of line
+    end : of the axis of time [s]
+    """
+    groups = groups_by_unit([unit for _, unit in labels])
+    columns = min(2, len(groups))
+    rows = -(-len(groups) // columns)
+    with page.figure(name, title, rows, columns, 3.4 * rows) as panels:
+        for axes, group in zip(panels, groups, strict=False):
+            for color, i in enumerate(group):
+                for style, (time, values) in runs.items():
+                    label = labels[i][0] if style == "-" else None
+                    axes.plot(time, values[:, i], style, color=line_color(color), label=label)
+            axes.set_title(quantity(", ".join(labels[i][0] for i in group), labels[group[0]][1]))
+            axes.legend(fontsize=7, ncols=3)
+            time_axis(axes, end)
+        for axes in panels[len(groups) :]:
+            axes.set_visible(False)
 
 
-def _mark_limits(axes: Axes, low: float, high: float) -> str:
-    """Draw limits that are near, and return words for the title."""
-    bottom, top = axes.get_ylim()
-    if low > 2.0 * bottom or high < 2.0 * top:
-        for limit in (low, high):
-            axes.axhline(limit, color="black", lw=1.0, ls=":")
-    return f" ({low:.0f} … {high:.0f})"
+def groups_by_unit(units: Sequence[str]) -> list[list[int]]:
+    """Return the numbers of like units together, in the order of first appearance, at most six each."""
+    found: dict[str, list[int]] = {}
+    for i, unit in enumerate(units):
+        found.setdefault(unit, []).append(i)
+    return [
+        members[i : i + LARGEST] for members in found.values() for i in range(0, len(members), LARGEST)
+    ]

@@ -24,19 +24,18 @@ def draw_weights(
     """Draw the critic weights that moved most beside Riccati's and the ideal ones W*.
 
     W* is the best fit of the basis to the optimum over the whole envelope (`analysis`); the weights
-    follow the vehicle, and need not be near it.
+    follow the run, and need not be near it.
     """
     critic, ideal = learned["critic"].values, analysis["ideal_weights"].values
+    time, m = learned["learn_time"].values, critic.shape[1]
     moved = np.argsort(-np.abs(critic[-1] - riccati))[:shown]
-    time = learned["learn_time"].values
-    m = critic.shape[1]
     with page.figure("weights", "Weights of critic and actors", 1, 2, 4.2) as (values, distance):
         for k, i in enumerate(moved):
             color = line_color(k)
             values.plot(time, critic[:, i], color=color, label=f"w{i + 1}")
             values.axhline(riccati[i], color=color, lw=0.8, ls="--")
             values.axhline(ideal[i], color=color, lw=0.8, ls=":")
-        values.set_title(f"{shown} of {m} that moved most (dashed: Riccati, dotted: W*)")
+        values.set_title(f"{len(moved)} of {m} that moved most (dashed: Riccati, dotted: W*)")
         values.set_ylabel("critic weight")
         low, high = critic[:, moved].min(), critic[:, moved].max()
         values.set_ylim(low - 0.4 * (high - low), high + 0.4 * (high - low))
@@ -57,10 +56,13 @@ def draw_weights(
             time_axis(axes, float(time[-1]))
 
 
-def draw_errors(page: Page, analysis: xr.Dataset) -> None:
-    """Draw the errors of value and policy along the learned trajectory, beside the linear ones."""
+def draw_errors(page: Page, analysis: xr.Dataset, moving: str) -> None:
+    """Draw the errors of value and policy along the learned trajectory, beside the linear ones.
+
+    `moving`: what is in the states.
+    """
     time = analysis["time"].values
-    title = "Against the optimum from the very state that the vehicle is in"
+    title = f"Against the optimum from the very state that the {moving} is in"
     with page.figure("errors", title, 1, 2, 3.8) as panels:
         for axes, kind, label in zip(
             panels,
@@ -77,15 +79,18 @@ def draw_errors(page: Page, analysis: xr.Dataset) -> None:
         legend_below(panels[0], columns=2)
 
 
-def draw_field(page: Page, analysis: xr.Dataset) -> None:
-    """Draw the Bellman error over two states around the vehicle, with Riccati's and learned weights."""
+def draw_field(page: Page, analysis: xr.Dataset, moving: str) -> None:
+    """Draw the Bellman error over two states around a moment, with Riccati's and learned weights.
+
+    `moving`: what is in the states.
+    """
     rows, columns = (str(analysis.attrs[f"field_{side}"]) for side in ("rows", "columns"))
     fields = {name: np.abs(analysis[f"field_{name}"].values) for name in ("linear", "learned")}
     both = np.concatenate([values.ravel() for values in fields.values()])
-    low = max(float(np.quantile(both, 0.02)), 1e-12)
-    norm = LogNorm(low, max(float(both.max()), 10.0 * low))
+    low = max(float(np.nanquantile(both, 0.02)), 1e-12)  # NaN at the origin itself
+    norm = LogNorm(low, max(float(np.nanmax(both)), 10.0 * low))
     moment = float(analysis.attrs["field_time"])
-    title = f"Bellman error around the vehicle at t = {moment:.1f} s"
+    title = f"Bellman error around the {moving} at t = {moment:.1f} s"
     with page.figure("field", title, 1, 2, 4.0) as panels:
         for axes, (name, values) in zip(panels, fields.items(), strict=True):
             x, y = analysis["column"].values, analysis["row"].values

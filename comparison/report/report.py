@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
 from ...online.records import write_text
 from ..study import Comparison
-from .report_tables import certificate, clairvoyant_check, conditions, summary, too_short, verdict
+from .report_tables import certificate, clairvoyant_check, conditions, summary, too_short
 from .style import Page
+from .words import CHECKED, words_of
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -31,57 +32,6 @@ summary { cursor: pointer; font-weight: 600; margin: .8rem 0; }
 @media (max-width: 640px) { body { margin: 1rem auto; } h1 { font-size: 1.35rem; } }
 """
 
-CAPTIONS = {
-    "regret": "Regret is how much more than the optimum a policy costs, from the same state. Each dot "
-    "is one initial state.",
-    "energy": "What it takes to hold the station, against how well it is held. Energy is that of "
-    "the thrusters where their power is known.",
-    "path": "The way back in space and from above.",
-    "states": "The pose on the way back, under the learned policy and at the optimum.",
-    "rates": "The rates on the same way.",
-    "forces_body": "Wrench that the thrusters are asked for, with what they can give on each axis "
-    "alone.",
-    "forces_earth": "Control in the earth frame. The cost weighs this, J⁻ᵀτ_b, not the body effort.",
-    "thrusters": "Thrust of each thruster, with the least sum of squares.",
-    "cost": "Cost so far, and how far it lies above.",
-    "errors": "At each moment the optimum is solved again from the state that the vehicle is in: how "
-    "far off the learned value and control are there, and how far the linear ones.",
-    "weights": "The weights of the value while it is learned. W* fits the optimum best over the "
-    "whole envelope; the learner fits the way that the vehicle is on, so it need not end there.",
-    "bellman": "The error that is learned from, and the Bellman error at the state.",
-    "monitor": "What the proof asks for along the learned run: (18) at fixed samples under the policy "
-    "of the moment; in how many directions what is learned from outweighs the leash; the "
-    "regressors; the bound on the weights; how far the policies are from the value; and the "
-    "proof's V_L.",
-    "field": "How well the equation of the optimum (HJI) is met around the vehicle (dot), over two of "
-    "its twelve states; the line is its way.",
-    "excitation": "The paper's claim: with sample points the weights converge although the way excites "
-    "only a few directions; without, they stay where they were or the run is lost. The right weights "
-    "are known exactly for the linearised vehicle.",
-}
-_COLUMNS = (
-    "From the state above; median and worst are those of the regret from all states. rms: distance "
-    "from the station. Energy: electrical, of the thrusters. Peak thrust: largest share of a "
-    "thruster's limit. Step: mean computing time of one control step, learning or predicting included."
-)
-WORDS = {
-    "optimum": "the least cost that the game allows, computed offline for the exact model, with a "
-    "certificate of its error",
-    "learned": "the policy that learns while the vehicle moves, from the linear one on",
-    "linear H-infinity": "the policy of the linearised game (its Riccati equation); learns nothing",
-    "regret": "cost of a policy minus V*, divided by V*",
-    "V*": "the cost of the optimum",
-    "γ": "how dear the disturbance's effort is; a small γ prepares for a strong disturbance",
-}
-
-DISTURBED_WORDS = {
-    "clairvoyant optimum": "the least cost over the time of the run for a control that knows the whole "
-    "disturbance beforehand, from the same state, for the vehicle that is driven; V_c is this cost",
-    "regret": "cost of a policy over the time of the run minus V_c, divided by V_c; nothing is added "
-    "for what is left at the end",
-    "dissipation margin": "how far the run stayed within the attenuation that the game promises",
-}
-
 
 def write_report(
     path: Path, comparison: Comparison, wide: Page, phone: Page, commands: Sequence[str]
@@ -92,25 +42,28 @@ def write_report(
     ----------
     wide, phone : the same figures for a page and for a phone
     """
-    name = comparison.station.model.vehicle.name
+    name, told = comparison.setup.problem.name, words_of(comparison)
     body = [
-        f"<h1>Station keeping of {escape(name)}: learned beside optimal</h1>",
-        f'<p class="lead">{escape(verdict(comparison))}</p>',
+        f"<h1>{escape(told.title)}: learned beside optimal</h1>",
+        f'<p class="lead">{escape(comparison.verdict)}</p>',
         *[f'<p class="fault">{escape(too_short(comparison))}</p>' for _ in comparison.too_short[:1]],
         *[f'<p class="fault">{escape(fault)}</p>' for fault in comparison.faults],
         "<h2>What was asked</h2>",
-        _asked(comparison),
-        _folded("The words used here", _words(comparison)),
+        f"<p>{escape(told.asked)}</p>",
+        _folded("The words used here", _list(told.words)),
         "<h2>What came out</h2>",
         _table(*summary(comparison)),
-        f"<p>{_COLUMNS}</p>",
-        *[_figure(key, wide.pictures[key], phone.pictures[key]) for key in wide.pictures],
+        f"<p>{escape(told.columns)}</p>",
+        *[
+            _figure(told.captions[key], wide.pictures[key], phone.pictures[key])
+            for key in wide.pictures
+        ],
         "<h2>How sure it is</h2>",
         "<p>The optimum is judged by other means than the solver that found it: a finer mesh, the "
         "equations integrated again, the HJI at the initial state, finite differences, a longer "
         "horizon and a second method that shares no equations with the first.</p>",
         _table(*certificate(comparison)),
-        *_clairvoyant(comparison),
+        *_checked(comparison),
         "<h2>The paper's conditions</h2>",
         "<p>They are sufficient, not necessary: a run may be good though one fails.</p>",
         _table(*conditions(comparison)),
@@ -130,48 +83,14 @@ def write_report(
     return write_text(path, page)
 
 
-def _asked(comparison: Comparison) -> str:
-    scenario = comparison.scenario
-    state = ", ".join(f"{value:g}" for value in scenario.initial_state)
-    others = comparison.n_states - 1
-    more = f" and from {others} random states of the envelope" if others else ""
-    if scenario.simulation.mode == "game":
-        against = (
-            "The disturbance is a second player, who wants the opposite and pays γ² for his effort "
-            f"(γ = {scenario.game.gamma:g}); every policy meets the answer of this player to its own "
-            "control, so that V* is the least possible cost for all of them."
-        )
-    else:
-        kind = scenario.simulation.disturbance.kind
-        against = (
-            f"The disturbance is real ({kind}), and no policy knows it beforehand. The clairvoyant "
-            "optimum does: it is the least that any control could pay over the time of the run that "
-            "knows the whole disturbance from the start, and so what no policy can beat. How much more "
-            "a policy pays is its regret: the price of not knowing the future, and of its own faults."
-        )
-    return (
-        f"<p>From the state ({escape(state)}) [m, rad, m/s, rad/s]{more} the vehicle goes back to its "
-        "station. The cost is the integral of weighted squares of position, attitude, rates and "
-        f"control. {against} The learner has {comparison.station.basis.n_basis} basis functions, "
-        "starts from the linear H-infinity policy, and learns only during the run that is scored.</p>"
-    )
-
-
-def _clairvoyant(comparison: Comparison) -> list[str]:
+def _checked(comparison: Comparison) -> list[str]:
     """Return what the clairvoyant optimum is checked by, nothing without one."""
-    if comparison.clairvoyant is None:
+    if comparison.shown is comparison.optimal:
         return []
-    return [
-        "<p>The certificate above is that of the game's optimum, which V* and the errors along the way "
-        "refer to. The clairvoyant optimum is checked on its own: the plant of the runs is integrated "
-        "with its control, and it is solved from several starts. Where these lead to different minima, "
-        "it is the least of them, and one that was not found may be lower still.</p>",
-        _table(*clairvoyant_check(comparison.clairvoyant)),
-    ]
+    return [f"<p>{escape(CHECKED)}</p>", _table(*clairvoyant_check(comparison.shown))]
 
 
-def _words(comparison: Comparison) -> str:
-    words = WORDS | (DISTURBED_WORDS if comparison.disturbed else {})
+def _list(words: Mapping[str, str]) -> str:
     entries = "".join(f"<li><b>{escape(k)}</b>: {escape(v)}</li>" for k, v in words.items())
     return f"<ul>{entries}</ul>"
 
@@ -180,8 +99,8 @@ def _folded(title: str, content: str) -> str:
     return f"<details><summary>{escape(title)}</summary>{content}</details>"
 
 
-def _figure(key: str, wide: bytes, phone: bytes) -> str:
-    caption = escape(CAPTIONS[key])
+def _figure(text: str, wide: bytes, phone: bytes) -> str:
+    caption = escape(text)
     return (
         f"<figure><figcaption>{caption}</figcaption><picture>"
         f'<source media="(max-width: 640px)" srcset="{_data(phone)}">'

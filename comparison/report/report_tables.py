@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import xarray as xr
 
+from ...symbolic import StationKeeping
 from ..policies import CONTENDERS
 from ..study import Comparison
 
 Table = tuple[list[str], list[list[str]]]
-REGRET_OF_A_RUN = (
-    "(cost - V_c) / V_c over the time of the run, nothing added for what is left then; V_c is the "
-    "clairvoyant optimum's cost"
-)
 CLAIRVOYANT_CHECK = {
     "value_error": "relative error of the value: mesh and re-integration, summed",
     "mesh_error": "relative change of the value by one degree of the polynomials",
@@ -23,43 +18,6 @@ CLAIRVOYANT_CHECK = {
     "largest_defect": "the same at any mesh point",
     "start_spread": "relative spread of the local minima that the starts led to; 0 where all agree",
 }
-
-
-def verdict(comparison: Comparison) -> str:
-    """Return the outcome in one sentence."""
-    if comparison.disturbed or comparison.regret is None:
-        return _disturbed_verdict(comparison)
-    learned, linear = (comparison.regret[name].median for name in ("learned", "linear"))
-    if not (math.isfinite(learned) and math.isfinite(linear)):
-        return "A run ended early, so there is no regret to compare."
-    change = 100 * (learned - linear) / linear
-    outcome = f"takes {-change:.0f} % off" if change < 0 else f"adds {change:.0f} % to"
-    states = "" if comparison.n_states == 1 else f" (median of {comparison.n_states} states)"
-    return (
-        f"The learned policy costs {100 * learned:.3f} % more than the optimum{states}; the linear "
-        f"H-infinity policy, which learns nothing, {100 * linear:.2f} %: learning {outcome} the excess."
-    )
-
-
-def _disturbed_verdict(comparison: Comparison) -> str:
-    """Return the outcome against the clairvoyant optimum, or without one between the policies."""
-    learned, linear = (comparison.metrics[name] for name in ("learned", "linear"))
-    if comparison.regret is None:
-        sentence = "There is no clairvoyant optimum to compare with, and so no regret"
-        costs = (learned.running_cost, linear.running_cost)
-    else:
-        sentence = "The clairvoyant optimum knows the whole disturbance beforehand"
-        costs = (learned.regret, linear.regret)
-    if costs[0] is None or costs[1] is None:
-        return f"{sentence}. A run of the two policies ended early, so there are no costs to compare."
-    if comparison.regret is None:
-        share = 100.0 * (costs[0] - costs[1]) / costs[1]
-        words = f"{-share:.1f} % less" if share < 0.0 else f"{share:.1f} % more"
-        return f"{sentence}. The learned policy costs {words} than the linear H-infinity policy."
-    return (
-        f"{sentence}: over the same run the learned policy costs {100 * costs[0]:.2f} % more than it, "
-        f"the linear H-infinity policy {100 * costs[1]:.2f} %."
-    )
 
 
 def too_short(comparison: Comparison) -> str:
@@ -73,53 +31,70 @@ def too_short(comparison: Comparison) -> str:
 def summary(comparison: Comparison) -> Table:
     """Return header and rows of the summary: one row a policy, from the scenario's own state.
 
-    Beside its regret the median and the largest from all states; rms of the distance from the station;
-    energy of the thrusters; the largest share of a thruster's limit; the mean time of a control step.
-    In `disturbed` mode the cost is that of the time of the run, and there is the dissipation margin.
+    Cost, and beside its regret the median and the largest from all states; in a real disturbance the
+    cost is that of the time of the run, and there is the dissipation margin; for a vehicle the rms of
+    the distance from the station, energy of the thrusters and the largest share of a thruster's limit,
+    for another problem the rms of the scaled state; the mean time of a control step.
     """
     ended = {name: _ended(comparison, name) for name in comparison.metrics}
+    vehicle = isinstance(comparison.setup, StationKeeping)
+    sizes = _vehicle_sizes if vehicle else _scaled_size
     header = ["policy", *_judgement_header(comparison)]
-    header += ["rms [m]", "energy [J]", "peak thrust [%]", "step [μs]"]
+    header += [*(VEHICLE_SIZES if vehicle else SCALED_SIZE), "step [μs]"]
     header += ["ended early"] if any(ended.values()) else []
-    rows = []
-    for name, metrics in comparison.metrics.items():
-        row = [
+    rows = [
+        [
             CONTENDERS[name].label,
             *_judgement(comparison, name),
-            _number(metrics.position_rms, ".3f"),
-            _number(metrics.energy, ".0f"),
-            _number(metrics.peak_thrust, ".0f", 100.0),
+            *sizes(comparison, name),
             _number(metrics.policy_mean, ".0f"),
             *([ended[name] or "no"] if any(ended.values()) else []),
         ]
-        rows.append(row)
-    if comparison.regret is not None:
-        value = f"{comparison.reference.attrs['value']:.3f}"
-        label = "clairvoyant optimum" if comparison.disturbed else "offline optimum"
-        rows.append([label, value, "0.000", *[""] * (len(header) - 3)])
+        for name, metrics in comparison.metrics.items()
+    ]
+    if comparison.reference.known:
+        value = f"{comparison.shown.attrs['value']:.3f}"
+        rows.append([comparison.reference.label, value, "0.000", *[""] * (len(header) - 3)])
     return header, rows
+
+
+VEHICLE_SIZES = ("rms [m]", "energy [J]", "peak thrust [%]")
+SCALED_SIZE = ("rms |x| [-]",)
+
+
+def _vehicle_sizes(comparison: Comparison, name: str) -> list[str]:
+    run = comparison.metrics[name]
+    return [
+        _number(run.position_rms, ".3f"),
+        _number(run.energy, ".0f"),
+        _number(run.peak_thrust, ".0f", 100.0),
+    ]
+
+
+def _scaled_size(comparison: Comparison, name: str) -> list[str]:
+    return [f"{comparison.scaled_rms[name]:.3g}"]
 
 
 def _judgement_header(comparison: Comparison) -> list[str]:
     header = ["cost"]
-    if comparison.regret is not None:
+    if comparison.reference.known:
         header += ["regret [%]"]
         header += ["median [%]", "worst [%]"] if comparison.n_states > 1 else []
-    return header + (["dissipation margin"] if comparison.disturbed else [])
+    return header + (["dissipation margin"] if comparison.margins else [])
 
 
 def _judgement(comparison: Comparison, name: str) -> list[str]:
     """Return cost, regret and margin of a policy, as the header has them."""
     metrics, regret = comparison.metrics[name], comparison.regret
-    row = [_number(metrics.running_cost if comparison.disturbed else metrics.cost, ".3f")]
+    row = [_number(comparison.reference.cost(metrics), ".3f")]
     if regret is not None:
         row.append(_number(metrics.regret, ".3f", 100.0))
         alone = len(comparison.all_metrics[name]) == 1
         row += [
-            "–" if alone else _number(value, ".3f", 100.0) if math.isfinite(value) else "∞"
-            for value in ((regret[name].median, regret[name].max) if comparison.n_states > 1 else ())
+            "–" if alone else _number(size, ".3f", 100.0)
+            for size in ((regret[name].median, regret[name].max) if comparison.n_states > 1 else ())
         ]
-    if comparison.disturbed:
+    if comparison.margins:
         row.append(_number(comparison.margins.get(name), ".3g"))
     return row
 

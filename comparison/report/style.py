@@ -10,11 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import matplotlib as mpl
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ...online.records import written_whole
+from ..records import optimum_name
 
 LEARNED, OPTIMAL, LINEAR = "#c1440e", "#12436d", "#8a8a8a"
 PALETTE = ("#12436d", "#c1440e", "#28a197", "#801650", "#f2a541", "#6c6c6c")
@@ -107,6 +109,11 @@ class Page:
         with written_whole(self.folder / f"{name}.pdf") as temporary:
             # without a date the same numbers give the same file
             sheet.savefig(temporary, format="pdf", metadata={"CreationDate": None})
+
+
+def pair(learned: xr.Dataset, optimal: xr.Dataset) -> list[tuple[xr.Dataset, str, str, str]]:
+    """Return the learned record and the optimum's, each with colour, name and style of its lines."""
+    return [(learned, LEARNED, "learned", "-"), (optimal, OPTIMAL, optimum_name(optimal), "--")]
 
 
 def legend_above(axes: Axes) -> None:

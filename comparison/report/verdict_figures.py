@@ -17,16 +17,16 @@ from .style import COLORS, OPTIMAL, Page, legend_below, time_axis
 def draw_cost(page: Page, comparison: Comparison) -> None:
     """Draw the cost to date of each run, and how far it lies above the optimum's.
 
-    In `disturbed` mode the optimum is the clairvoyant one; without it the linear policy takes its
-    place. The second panel is cut where policies end that are far worse than the linear one.
+    Without the optimum that regret refers to the linear policy takes its place. The second panel is
+    cut where policies end that are far worse than the linear one.
     """
     records = comparison.records
     end = max(float(record["time"][-1]) for record in records.values())
     above, unit = _above(comparison)
     last = {name: float(values[-1]) for name, (_, values) in above.items() if len(values)}
     title = "Cost: " + ", ".join(f"{name} {last[name]:.2f} {unit}" for name in ("learned", "linear"))
-    optimum = "the clairvoyant optimum" if comparison.disturbed else "the optimum"
-    reference = f"{optimum}'s" if comparison.regret is not None else "the linear policy's"
+    optimum, known = comparison.reference.name, comparison.reference.known
+    reference = f"the {optimum}'s" if known else "the linear policy's"
     with page.figure("cost", f"{title} above {reference}", 1, 2, 4.4) as (total, excess):
         for name, record in records.items():
             early = comparison.metrics[name].stopped
@@ -37,9 +37,9 @@ def draw_cost(page: Page, comparison: Comparison) -> None:
                 record["time"], cost_to_date(record), label=label, color=COLORS[name], zorder=layer
             )
             excess.plot(*above[name], color=COLORS[name], zorder=layer)
-        if comparison.regret is not None:
-            best, label = comparison.reference, optimum.removeprefix("the ")
-            total.plot(best["time"], best["cost"], "--", color=OPTIMAL, label=label, zorder=4)
+        if known:
+            best = comparison.shown
+            total.plot(best["time"], best["cost"], "--", color=OPTIMAL, label=optimum, zorder=4)
             excess.axhline(0.0, color=OPTIMAL, ls="--")
         far = 3.0 * max(abs(last["linear"]), abs(last["learned"]), 0.1)
         near = [values for _, values in above.values() if len(values) and abs(values[-1]) < far]
@@ -62,8 +62,7 @@ def draw_regrets(page: Page, comparison: Comparison) -> None:
     found = found or comparison.regrets
     count = comparison.n_states
     states = "one state" if count == 1 else f"{count} states"
-    optimum = "clairvoyant optimum" if comparison.disturbed else "optimum"
-    title = f"Regret from {states}: how much dearer than the {optimum}"
+    title = f"Regret from {states}: how much dearer than the {comparison.reference.name}"
     with page.figure("regret", title, 1, 1, 0.42 * len(found) + 1.6) as (axes,):
         for row, (name, regrets) in enumerate(found.items()):
             percent = 100.0 * np.array([r for r in regrets if r is not None and r > 0.0])
@@ -136,8 +135,8 @@ def _needed(run: RunMetrics, electrical: bool) -> float:
 def _above(comparison: Comparison) -> tuple[dict[str, tuple[Array, Array]], str]:
     """Return times and cost to date above the reference's, for each run, and the unit."""
     records = comparison.records
-    if comparison.regret is not None:
-        optimal = comparison.reference
+    if comparison.reference.known:
+        optimal = comparison.shown
         time, cost = optimal["time"].values, optimal["cost"].values
         factor, unit = 100.0 / float(optimal.attrs["value"]), "%"
     else:

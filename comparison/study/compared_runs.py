@@ -10,27 +10,18 @@ from pathlib import Path
 import xarray as xr
 
 from ...offline import OfflineSolver
-from ...symbolic import RunError
+from ...symbolic import RunError, Setup
 from ..merit import RunMetrics, regret, run_metrics
 from ..parallel import Work, run_tasks
+from ..policies import available
 from ..records import KIND as CLAIRVOYANT
 from ..records import clairvoyant_record, contender_record, optimal_record
 from ..scenario import Scenario
+from .reference import OPTIMUM, Optimum, Reference, reference_of
 
 Tell = Callable[[str, float], None]
 
-EVERYWHERE = ("learned", "linear", "lqr", "pid", "mpc")  # run from every state
-POLICIES = (*EVERYWHERE, "quadratic", "gradient")  # from the scenario's own
-OPTIMUM = "optimal"
-
-
-@dataclass(frozen=True)
-class Optimum:
-    """What a comparison keeps of the optimum from one state; a `fault` where there is none."""
-
-    value: float | None
-    value_error: float
-    fault: str = ""
+ALONE = ("quadratic", "gradient")  # variants of the learned policy: from the scenario's own state
 
 
 @dataclass(frozen=True)
@@ -40,13 +31,21 @@ class Made:
     Attributes
     ----------
     metrics : of each policy from each state that it was run from, with its regret
-    optima : of the game
-    clairvoyant : the clairvoyant optima in `disturbed` mode, else none
+    optima : by kind, of the game, and what else runs are held against
     """
 
     metrics: dict[str, list[RunMetrics]]
-    optima: list[Optimum]
-    clairvoyant: list[Optimum]
+    optima: dict[str, list[Optimum]]
+
+
+def policies(setup: Setup) -> list[str]:
+    """Return the names of the policies for a problem, those that are run from every state first."""
+    return sorted(available(setup), key=lambda name: name in ALONE)
+
+
+def everywhere(setup: Setup) -> list[str]:
+    """Return the names of the policies that are run from every state."""
+    return [name for name in policies(setup) if name not in ALONE]
 
 
 @dataclass(frozen=True)
@@ -65,12 +64,11 @@ def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
     RunError
         If a worker was lost.
     """
-    disturbed = scenarios[0].simulation.mode == "disturbed"
-    optima = (OPTIMUM, CLAIRVOYANT) if disturbed else (OPTIMUM,)
+    reference, setup = reference_of(scenarios[0]), scenarios[0].setup()
     tasks = [
         _Task(state, what)
         for state in range(len(scenarios))
-        for what in (*optima, *(EVERYWHERE if state else POLICIES))
+        for what in (*reference.solved, *(everywhere(setup) if state else policies(setup)))
     ]
     answers: dict[_Task, RunMetrics | Optimum] = {}
     tell("runs", 0.0)
@@ -80,18 +78,18 @@ def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
                 raise RunError(str(event.failure))
             answers[tasks[event.task]] = event.message
             tell("runs", len(answers) / len(tasks))
-    found: dict[str, list[Optimum]] = {OPTIMUM: [], CLAIRVOYANT: []}
-    metrics: dict[str, list[RunMetrics]] = {name: [] for name in POLICIES}
+    found: dict[str, list[Optimum]] = {kind: [] for kind in reference.solved}
+    metrics: dict[str, list[RunMetrics]] = {name: [] for name in policies(setup)}
     for task in tasks:
         answer = answers[task]
         if isinstance(answer, Optimum):
             found[task.what].append(answer)
         else:
             metrics[task.what].append(answer)
-    references = found[CLAIRVOYANT if disturbed else OPTIMUM]
     for runs in metrics.values():
-        runs[:] = [_regretted(run, references[i].value, disturbed) for i, run in enumerate(runs)]
-    return Made(metrics, found[OPTIMUM], found[CLAIRVOYANT])
+        pairs = zip(runs, found[reference.kind], strict=False)
+        runs[:] = [_regretted(run, optimum.value, reference) for run, optimum in pairs]
+    return Made(metrics, found)
 
 
 def record_path(folder: Path, state: int, what: str) -> Path:
@@ -102,8 +100,8 @@ def record_path(folder: Path, state: int, what: str) -> Path:
 def _worker(shipment: tuple[list[Scenario], Path]) -> Work[_Task, RunMetrics | Optimum]:
     """Return what makes one record and tells its figures of merit."""
     scenarios, folder = shipment
-    station = scenarios[0].station_keeping()
-    solver = OfflineSolver(station.problem, scenarios[0].offline)
+    setup = scenarios[0].setup()
+    solver = OfflineSolver(setup.problem, scenarios[0].offline)
 
     def work(task: _Task) -> Iterator[RunMetrics | Optimum]:
         scenario, path = scenarios[task.state], record_path(folder, task.state, task.what)
@@ -112,7 +110,7 @@ def _worker(shipment: tuple[list[Scenario], Path]) -> Work[_Task, RunMetrics | O
         elif task.what == CLAIRVOYANT:
             yield _optimum(lambda: clairvoyant_record(scenario, path))
         else:
-            yield run_metrics(contender_record(scenario, task.what, path), station, None)
+            yield run_metrics(contender_record(scenario, task.what, path), setup, None)
 
     return work
 
@@ -126,6 +124,5 @@ def _optimum(make: Callable[[], xr.Dataset]) -> Optimum:
     return Optimum(value, accuracy, str(attributes["faults"]))
 
 
-def _regretted(run: RunMetrics, optimum: float | None, disturbed: bool) -> RunMetrics:
-    cost = run.running_cost if disturbed else run.cost
-    return replace(run, regret=regret(cost, optimum))
+def _regretted(run: RunMetrics, optimum: float | None, reference: type[Reference]) -> RunMetrics:
+    return replace(run, regret=regret(reference.cost(run), optimum))

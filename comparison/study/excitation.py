@@ -2,25 +2,28 @@
 
 The same run without and with sample points, from half of the Riccati weights: how many
 directions of the regressor the trajectory has excited so far, the rank margin of (18), and the distance
-to the weights that are right. Those are known exactly for the linearised vehicle (ζ'P ζ is its value);
-for the vehicle itself the reference is the fixed point of the same rule on ten times as many samples.
+to the weights that are right. Those are known exactly for the linearised problem (ζ'P ζ is its value);
+for the problem itself the reference is the fixed point of the same rule on ten times as many samples.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...offline import Plant
 from ...online import Learner, LearnerSettings, draw_samples, rank_margin
-from ...symbolic import Basis, Problem, RunError, quadratic
+from ...symbolic import Basis, Problem, RunError, Setup, quadratic
 from ...symbolic.arrays import Array
 from ..scenario import Scenario
 from .game_run import advance
+from .pace import pace
+from .words import subject
 
 # the Bellman error alone, without what holds the weights
-PLAIN = {
+PLAIN: dict[str, Any] = {
     "rule": "least_squares",
     "error": "bellman",
     "safeguard": False,
@@ -62,48 +65,55 @@ class ExcitationRun:
 def excitation_runs(
     scenario: Scenario, *, n_samples: int = 300, duration: float = 30.0, shrink: float = 0.3
 ) -> dict[str, list[ExcitationRun]]:
-    """Return three runs each on the linearised vehicle and on the vehicle.
+    """Return three runs each on the linearised problem and on the problem, by what they are called.
 
     N = 0 and N = `n_samples` under the very same settings, and N = 0 again with the covariance held so
     low that the run can't jump: without samples the first rows, few and alike, throw the weights far
     off in every direction they don't know.
 
     With the quadratic monomials and without leash, so that nothing but the data moves the weights, and
-    in the part `shrink` of the scenario's envelope, where drag leaves the monomials a meaning.
+    in the part `shrink` of the scenario's envelope, where the monomials still have a meaning. The time
+    [s] and the gains are for the pace of the shipped vehicle, and follow that of another problem.
     """
-    station = scenario.station_keeping()
-    eager = scenario.learner.model_copy(update=PLAIN)
+    setup, name = scenario.setup(), subject(scenario.setup())
+    eager = scenario.learner.model_copy(update=plain(setup, scenario.learner.period))
     cautious = eager.model_copy(update={"covariance": 1e2, "covariance_bound": 1e3})
-    envelope, start = shrink * station.envelope, shrink * scenario.initial_state
+    envelope, start = shrink * setup.envelope, shrink * scenario.initial_state
     seed = scenario.samples.seed
     runs = {}
-    for label, problem in (
-        ("linearised vehicle", station.problem.linearized()),
-        ("vehicle", station.problem),
-    ):
-        basis = Basis.build("quadratic", quadratic, problem.zeta, station.half_widths)
+    linearized = setup.problem.linearized()
+    for label, problem in ((f"linearised {name}", linearized), (name, setup.problem)):
+        basis = Basis.build("quadratic", quadratic, problem.zeta, setup.half_widths)
         many = draw_samples(envelope, 10 * n_samples, seed + 1)
-        linear = label == "linearised vehicle"
         riccati = basis.quadratic_weights(problem.P)
-        ideal = riccati if linear else fixed_point(problem, basis, eager, many)
+        exact = problem is linearized
+        ideal = riccati if exact else fixed_point(problem, basis, eager, many)
         runs[label] = [
             excitation_run(
-                name,
+                run,
                 problem,
                 basis,
                 settings,
                 draw_samples(envelope, n, seed),
                 start,
                 ideal,
-                duration,
+                duration / pace(setup),
             )
-            for name, settings, n in (
+            for run, settings, n in (
                 ("N = 0", eager, 0),
                 ("N = 0, covariance held low", cautious, 0),
                 (f"N = {n_samples}", eager, n_samples),
             )
         ]
     return runs
+
+
+def plain(setup: Setup, period: float) -> dict[str, Any]:
+    """Return `PLAIN` at the pace of a problem that is learned in periods [s]."""
+    faster = pace(setup)
+    gain = 2.0 * faster
+    rates = {"gain_actor_1": gain, "gain_actor_2": gain, "forgetting": min(gain, 0.99 / period)}
+    return PLAIN if faster == 1.0 else PLAIN | rates
 
 
 def fixed_point(

@@ -67,6 +67,6 @@ def advance(learner: Learner, plant: Plant, zeta: Array, dt: float, *, disturbed
     reached = integrate(
         rhs, zeta, span, rtol=1e-6, atol=1e-8, method="RK45", first_step=dt / 4, max_calls=5000
     )[-1]
-    if np.abs(reached / plant.problem.scale).max() > 10.0:
+    if not np.abs(reached / plant.problem.scale).max() <= 10.0:  # nor NaN
         raise RunError("the state left ten times the envelope")
     return np.asarray(reached)

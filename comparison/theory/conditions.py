@@ -34,7 +34,7 @@ def scenario_conditions(
     bounds : on ε and ε', from ideal weights, see `optima.load_ideal`
     c_lower : infimum over a run of (18)'s λ_min; that at the initial weights if None
     """
-    setup = scenario.station_keeping()
+    setup = scenario.setup()
     learner = Learner(
         setup.problem,
         setup.basis,

@@ -76,7 +76,7 @@ def _weights(record: xr.Dataset) -> list[Condition]:
 
 
 def _stayed(scenario: Scenario, record: xr.Dataset) -> Condition:
-    envelope = scenario.station_keeping().envelope
+    envelope = scenario.setup().envelope
     share = np.abs(record["zeta"].values) / envelope
     far, outside = float(share.max()), float(np.mean(share.max(axis=1) > 1.0))
     name = str(record["state"].values[int(share.max(axis=0).argmax())])
@@ -160,7 +160,7 @@ def _slow_ball(found: Theory) -> Condition:
 
 def _closed(scenario: Scenario, found: Theory) -> Condition:
     """Remark 3's own χ, a ball in ζ, against the one that the suprema were taken over."""
-    inside = float(scenario.station_keeping().envelope.min())
+    inside = float(scenario.setup().envelope.min())
     c = found.found if found.found.alpha_5 > 0.0 else found.slow
     radius = float("inf") if c is None else c.radius
     reach = found.suprema.class_k * max(float(found.size[0]), radius)

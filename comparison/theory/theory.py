@@ -87,7 +87,7 @@ def along(record: xr.Dataset) -> Array:
 
 def theory(scenario: Scenario, record: xr.Dataset, ideal: Ideal) -> Theory:
     """Return the theorem's quantities along a run of the scenario."""
-    setup, learner = scenario.station_keeping(), scenario.learner
+    setup, learner = scenario.setup(), scenario.learner
     zeta, W = along(record), ideal.weights
     errors = (
         W - record["critic"].values,

@@ -104,6 +104,11 @@ class LearnedPolicy:
         self.u_control = np.zeros(setup.problem.n_inputs)
         self.u_disturbance = np.zeros(len(setup.game.W_d))
 
+    @property
+    def learned(self) -> LearnedPolicy:
+        """The policy itself, where a vehicle's controller has one inside."""
+        return self
+
     def step(self, zeta: Array, dt: float) -> Array:
         """Return û_1 at ζ (n,) to hold for dt [s], shape (k,).
 
