@@ -170,7 +170,6 @@ def test_costate_rows_leave_18_alone() -> None:
     points = fixed_points(scenario.samples, scenario.station_keeping())
     bellman = quick_scenario("learner.error=bellman", "learner.safeguard=false")
     residual = Controller(bellman).learner.sample_residual()
-    assert residual is not None
     assert points.shape == (200, 12)
     normalizer = np.sqrt(1.0 + np.sum(residual.omega**2, axis=1))
     singular = np.linalg.svd(residual.omega / np.sqrt(normalizer)[:, None], compute_uv=False)

@@ -52,7 +52,6 @@ def test_rank_falls_with_actors_that_stop_acting() -> None:
     def margin_and_rank(start: Array) -> tuple[float, int]:
         learner = Learner(problem, basis, LearnerSettings(), samples, exact, start, functions)
         residual = learner.sample_residual()
-        assert residual is not None
         return rank_margin(residual.omega), int(np.linalg.matrix_rank(gram(residual.omega), tol=1e-9))
 
     margin, rank = margin_and_rank(exact)

@@ -103,9 +103,8 @@ def test_with_its_start_as_reference_a_learner_does_not_fall_back_to_the_right_o
     for reference in ("riccati", "initial"):
         overrides = ("learner.weight_factor=0.5", f"learner.reference={reference}")
         learner = Controller(quick_scenario(*COSTATE, *overrides)).learner
-        assert learner._guard is not None
         start = (learner.actor_1, learner.actor_2)
-        fell_back.append(learner._guard.certified(state, start)[2])
+        fell_back.append(learner.guard.certified(state, start).restarted)
     assert fell_back == [True, False]
 
 

@@ -22,7 +22,7 @@ WINGS = {
         *("arrays", "errors", "toml", "integration", "compiled"),
         *("game", "value", "underwater", "textbook"),
     ),
-    "online": ("paper", "laws", "rows", "learning", "vehicle", "records"),
+    "online": ("paper", "vector", "laws", "rows", "learning", "vehicle", "records"),
     "offline": (
         *("settings", "path", "direct", "saddle", "certificate", "solve"),
         *("responses", "ideal_weights"),

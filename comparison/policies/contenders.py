@@ -27,11 +27,9 @@ _GRADIENT: dict[str, dict[str, Any]] = {
         "normalizer": "paper",
         "leash": 0.0,
         "gain_samples": None,
-        "average_samples": False,
         "gain_actor_1": 2.0,
         "gain_actor_2": 2.0,
     },
-    "samples": {"strategy": "fixed"},
 }
 
 

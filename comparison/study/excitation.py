@@ -140,8 +140,7 @@ def excitation_run(
         spectrum = np.linalg.eigvalsh(gram)
         excited = float(np.sum(spectrum > 1e-6 * max(spectrum[-1], 1e-300)))
         error = float(np.linalg.norm(learner.critic - ideal) / np.linalg.norm(ideal))
-        residual = learner.sample_residual()
-        margin = 0.0 if residual is None else rank_margin(residual.omega)
+        margin = rank_margin(learner.sample_residual().omega)
         rows.append((i * dt, excited, margin, error))
         try:
             learner.step(zeta, dt)

@@ -64,7 +64,7 @@ def check(
         station.functions,
     )
     residual = learner.sample_residual()
-    margin = 0.0 if residual is None else rank_margin(residual.omega)
+    margin = rank_margin(residual.omega)
     margin = margin if c_lower is None else min(margin, c_lower)
     return [
         _pitch(scenario),
@@ -154,7 +154,7 @@ def _representation(bounds: Bounds | None) -> Condition:
 def _samples(scenario: Scenario, learner: Learner) -> list[Condition]:
     residual = learner.sample_residual()
     m = learner.basis.n_basis
-    if residual is None:
+    if not len(residual):
         none = "there are no samples; give samples.number"
         return [Condition("rank of (18) is m", "(18), Assumption 4", 0.0, float(m), False, none)]
     spectrum = regressor_spectrum(residual.omega)

@@ -15,7 +15,6 @@ from pydantic import (
 
 from ...symbolic.toml import Settings
 from ..laws import Normalizer
-from ..rows import Strategy
 
 
 class LearnerSettings(Settings):
@@ -34,7 +33,6 @@ class LearnerSettings(Settings):
     normalizer : weight of a row; `paper` is 1/p as printed, see `critic.row_weights`
     gain_critic : η_c of the row at the state [1/s]
     gain_samples : η_c of the sample rows [1/s]; as gain_critic when not given
-    average_samples : divide the sum over the samples by N
     gain_actor_1, gain_actor_2 : η_a1, η_a2 of (20)(21) [1/s]
     forgetting : β of least squares [1/s]
     covariance, covariance_bound : Γ(0) and Γ_max as multiples of the identity
@@ -59,7 +57,6 @@ class LearnerSettings(Settings):
     normalizer: Normalizer = "paper"
     gain_critic: NonNegativeFloat = 1.0
     gain_samples: NonNegativeFloat | None = None
-    average_samples: bool = False
     gain_actor_1: PositiveFloat = 2.0
     gain_actor_2: PositiveFloat = 2.0
     forgetting: NonNegativeFloat = 2.0
@@ -98,24 +95,20 @@ class SampleSettings(Settings):
 
     Attributes
     ----------
-    strategy : `fixed` in the envelope, `shrinking` with the state, or along the predicted `trajectory`
-    number : N of the points
+    number : N of the points, fixed in the envelope
     seed : of everything that is drawn
-    inner : fixed and shrinking points are shrunk by a factor uniform on (inner, 1), so that some lie
-        near the origin
-    spread : of moving points around the state or the trajectory, as a part of its largest scaled entry
-    ahead : part of the predicted trajectory that the points follow [s]
+    inner : the points are shrunk by a factor uniform on (inner, 1), so that some lie near the origin
+    spread : of the starts of predicted trajectories around the state, as a part of its largest scaled
+        entry
     paths : trajectories predicted for `costate` rows, the first from the state itself
     path_points : points of each that give rows
     remember : also learn weights for the whole envelope, to be used when learning is switched off
     """
 
-    strategy: Strategy = "fixed"
     number: NonNegativeInt = 600
     seed: NonNegativeInt = 1
     inner: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
     spread: PositiveFloat = 0.5
-    ahead: PositiveFloat = 12.0
     paths: PositiveInt = 4
     path_points: Annotated[int, Field(ge=2)] = 20
     remember: bool = False

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...symbolic import InputError, StationKeeping, require_pitch
 from ...symbolic.arrays import Array
 from ..learning import Learner, LearnerSettings, LearnerStep, SampleSettings
-from ..rows import FixedSamples, SampleStrategy, ShrinkingSamples, TrajectorySamples, draw_samples
+from ..rows import draw_samples
 
 
 class ControllerScenario(Protocol):
@@ -87,7 +87,7 @@ class Controller:
             self.setup.problem,
             self.setup.basis,
             scenario.learner,
-            sample_strategy(scenario.samples, self.setup) if learn else np.zeros((0, 12)),
+            fixed_points(scenario.samples, self.setup) if learn else np.zeros((0, 12)),
             reference,
             weights,
             self.setup.functions,
@@ -176,23 +176,6 @@ def _start(scenario: ControllerScenario, setup: StationKeeping) -> tuple[Array, 
     return start, start
 
 
-def sample_strategy(settings: SampleSettings, setup: StationKeeping) -> SampleStrategy:
-    """Return the strategy that the settings name."""
-    if settings.strategy == "trajectory":
-        return TrajectorySamples(
-            setup.half_widths,
-            settings.number,
-            settings.seed,
-            spread=settings.spread,
-            ahead=settings.ahead,
-        )
-    if settings.strategy == "shrinking":
-        box, inner = setup.half_widths, settings.inner
-        points = draw_samples(box, settings.number, settings.seed, inner=inner)
-        return ShrinkingSamples(points, box, settings.spread)
-    return FixedSamples(fixed_points(settings, setup))
-
-
 def fixed_points(settings: SampleSettings, setup: StationKeeping) -> Array:
-    """Return the fixed ζ_j of (18), in the envelope, whatever the strategy, shape (N, 12)."""
+    """Return the fixed ζ_j of (18), in the envelope, shape (N, 12)."""
     return draw_samples(setup.envelope, settings.number, settings.seed, inner=settings.inner)

@@ -200,4 +200,4 @@ class _Loop:
         if isinstance(self.policy, Controller) and self.policy.learn:
             learner = self.policy.learner
             self._record_learner(learner.observe(self.policy.zeta), last=True)
-            self.history.remembered = None if learner.memory is None else learner.memory.weights
+            self.history.remembered = learner.memory.weights
