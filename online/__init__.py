@@ -1,6 +1,6 @@
 """Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
 
-from .learning import Learner, LearnerSettings, LearnerStep, Look, Monitor, SampleSettings
+from .learning import Learner, LearnerSettings, LearnerStep, Monitor, MonitorSample, SampleSettings
 from .paper import rank_margin
 from .records import load, load_weights, save, to_dataset
 from .rows import draw_samples
@@ -28,8 +28,8 @@ __all__ = [
     "Learner",
     "LearnerSettings",
     "LearnerStep",
-    "Look",
     "Monitor",
+    "MonitorSample",
     "NoiseSettings",
     "Policy",
     "SampleSettings",

@@ -10,8 +10,8 @@ from stationkeep.online import (
     History,
     Learner,
     LearnerSettings,
-    Look,
     Monitor,
+    MonitorSample,
     draw_samples,
     run,
 )
@@ -40,12 +40,12 @@ def regressors(actor_1: Array, actor_2: Array) -> tuple[Array, Array]:
     return np.array(rows), np.array(costs)
 
 
-def looks(settings: LearnerSettings, points: Array, steps: int) -> tuple[Learner, list[Look]]:
+def looks(settings: LearnerSettings, points: Array, steps: int) -> tuple[Learner, list[MonitorSample]]:
     problem, basis, functions = two_state()
     learner = Learner(problem, basis, settings, POINTS, TWO_STATE_WEIGHTS, START, functions)
     monitor = Monitor(learner, points)
     return learner, [
-        monitor.look(0.1 * i, learner.step(np.array([0.4, -0.3]), 0.1)) for i in range(steps)
+        monitor.sample(0.1 * i, learner.step(np.array([0.4, -0.3]), 0.1)) for i in range(steps)
     ]
 
 
@@ -141,7 +141,7 @@ def test_weights_that_are_not_finite_are_looked_at_all_the_same() -> None:
         problem, basis, LearnerSettings(leash=0.1), POINTS, TWO_STATE_WEIGHTS, START, functions
     )
     learner.actor_1 = learner.actor_1 * np.nan
-    look = Monitor(learner, POINTS).look(0.0, learner.observe(np.array([0.4, -0.3])))
+    look = Monitor(learner, POINTS).sample(0.0, learner.observe(np.array([0.4, -0.3])))
     assert np.isnan([look.rank_margin, look.regressor, look.row_margin]).all()
     assert look.row_rank == 0
 

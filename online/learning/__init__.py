@@ -2,7 +2,7 @@
 
 from .learner import Learner
 from .learner_step import LearnerStep
-from .monitor import Look, Monitor
+from .monitor import Monitor, MonitorSample
 from .settings import LearnerSettings, SampleSettings
 
-__all__ = ["Learner", "LearnerSettings", "LearnerStep", "Look", "Monitor", "SampleSettings"]
+__all__ = ["Learner", "LearnerSettings", "LearnerStep", "Monitor", "MonitorSample", "SampleSettings"]

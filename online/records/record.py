@@ -12,7 +12,7 @@ import xarray as xr
 from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ...symbolic.underwater import STATE_NAMES
-from ..learning import Look
+from ..learning import MonitorSample
 from ..vehicle import History
 from .files import load, versions
 
@@ -101,7 +101,7 @@ def _variables(
     }
 
 
-def _looks(looks: list[Look]) -> dict[str, tuple[tuple[str, ...], Array, str]]:
+def _looks(looks: list[MonitorSample]) -> dict[str, tuple[tuple[str, ...], Array, str]]:
     """Return dimensions, values and unit of what the monitor saw."""
     units = {
         **dict.fromkeys(("rank_margin", "rank_bound", "row_margin", "row_rank"), "1"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ...symbolic.arrays import Array
-from ..learning import Look
+from ..learning import MonitorSample
 
 
 @dataclass
@@ -33,7 +33,7 @@ class History:
     critic: list[Array] = field(default_factory=list)
     actor_1: list[Array] = field(default_factory=list)
     actor_2: list[Array] = field(default_factory=list)
-    looks: list[Look] = field(default_factory=list)
+    looks: list[MonitorSample] = field(default_factory=list)
     remembered: Array | None = None
     stopped: str | None = None
     wall_seconds: float = 0.0

@@ -179,7 +179,7 @@ class _Loop:
         history = self.history
         if self.monitor and (last or self.t >= self.next_look - 1e-9):
             self.next_look = self.t + self.settings.monitor_period
-            history.looks.append(self.monitor.look(self.t, seen))
+            history.looks.append(self.monitor.sample(self.t, seen))
         history.learn_time.append(self.t)
         history.bellman_error.append(seen.bellman_error)
         history.sample_error.append(seen.sample_error)
