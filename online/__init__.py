@@ -1,6 +1,14 @@
 """Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
 
-from .learning import Learner, LearnerSettings, LearnerStep, Monitor, MonitorSample, SampleSettings
+from .learning import (
+    AS_PRINTED,
+    Learner,
+    LearnerSettings,
+    LearnerStep,
+    Monitor,
+    MonitorSample,
+    SampleSettings,
+)
 from .paper import rank_margin
 from .records import load, load_weights, save, to_dataset
 from .rows import draw_samples
@@ -19,6 +27,7 @@ from .vehicle import (
 )
 
 __all__ = [
+    "AS_PRINTED",
     "Allocation",
     "Allocator",
     "Controller",

@@ -26,7 +26,7 @@ from stationkeep.online import Learner, LearnerSettings, draw_samples, rank_marg
 from stationkeep.online.laws import Equations, LeastSquares
 from stationkeep.symbolic import InputError
 
-from .games import TWO_STATE_WEIGHTS, Array, two_state
+from .games import TWO_STATE_WEIGHTS, Array, plain, two_state
 
 SAMPLES = draw_samples(np.ones(2), 100, seed=0)
 GAINS = Gains(1.0, 3.0, 2.0)
@@ -247,9 +247,7 @@ def test_without_25_there_is_no_exact_bound() -> None:
 
 def learned(start: Array, zeta0: Array, gains: Gains, *, disturbed: bool, duration: float) -> GameRun:
     problem, basis, functions = two_state()
-    settings = LearnerSettings(
-        rule="gradient",
-        normalizer="paper",
+    settings = LearnerSettings.as_printed(
         gain_critic=gains.critic,
         gain_actor_1=gains.actor_1,
         gain_actor_2=gains.actor_2,
@@ -306,7 +304,7 @@ class Watched(LeastSquares):
 def test_v_l_of_least_squares_falls(start: Array) -> None:
     """V + W̃_c'Γ^-1 W̃_c/2 + ... along the run of least squares with forgetting."""
     problem, basis, functions = two_state()
-    settings = LearnerSettings(gain_actor_1=1.0, gain_actor_2=0.8, forgetting=1.0, covariance=10.0)
+    settings = plain(gain_actor_1=1.0, gain_actor_2=0.8, forgetting=1.0, covariance=10.0)
     law = Watched(settings)
     learner = Learner(
         problem, basis, settings, SAMPLES, TWO_STATE_WEIGHTS, start, functions, critic=law

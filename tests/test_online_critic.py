@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from stationkeep.online import Learner, LearnerSettings, draw_samples
 from stationkeep.online.laws import Gradient, LeastSquares, NormalEquations, row_weights
 
-from .games import TWO_STATE_WEIGHTS, Array, two_state
+from .games import TWO_STATE_WEIGHTS, Array, plain, two_state
 
 M = 6
 
@@ -91,7 +91,7 @@ def test_a_short_learning_step_is_eulers_step_of_the_printed_law() -> None:
     problem, basis, functions = two_state()
     samples = draw_samples(np.ones(2), 12, seed=0)
     start, zeta, dt = np.array([0.9, 0.3, 1.5]), np.array([0.6, -0.4]), 1e-7
-    printed = LearnerSettings(rule="gradient", normalizer="paper", gain_critic=0.7)
+    printed = LearnerSettings.as_printed(gain_critic=0.7)
     learner = Learner(problem, basis, printed, samples, TWO_STATE_WEIGHTS, start, functions)
     learner.actor_1, learner.actor_2 = np.array([0.8, 0.1, 1.2]), np.array([0.5, -0.1, 0.9])
     rate = printed_rate(learner, zeta, samples, 0.7)
@@ -106,7 +106,7 @@ def test_a_gain_of_the_sample_rows() -> None:
     start, zeta, dt = np.array([0.9, 0.3, 1.5]), np.array([0.6, -0.4]), 1e-7
 
     def rate(points: Array, **options: float) -> Array:
-        chosen = LearnerSettings.model_validate({"rule": "gradient", **options})
+        chosen = LearnerSettings.as_printed(**options)
         learner = Learner(problem, basis, chosen, points, TWO_STATE_WEIGHTS, start, functions)
         learner.step(zeta, dt)
         return (learner.critic - start) / dt
@@ -245,7 +245,7 @@ def test_leash_is_relative_to_what_the_samples_know() -> None:
     reference = np.array([0.7, 0.1, 1.2])
     gap = []
     for leash in (0.0, 1e-3, 1e6):
-        chosen = LearnerSettings(leash=leash)
+        chosen = plain(leash=leash)
         samples = draw_samples(np.ones(2), 100, seed=0)
         learner = Learner(problem, basis, chosen, samples, reference, None, functions)
         for _ in range(80):

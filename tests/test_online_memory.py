@@ -26,7 +26,7 @@ from stationkeep.online.learning.memory import EnvelopeMemory
 from .games import TWO_STATE_WEIGHTS, Array, quick_scenario, two_state
 
 REFERENCE = np.array([0.8, 0.2, 1.4])
-SETTINGS = LearnerSettings(error="costate", safeguard=True, steps=200)
+SETTINGS = LearnerSettings(steps=200)
 
 
 def remembering(entry: float, n_steps: int = 40) -> Learner:

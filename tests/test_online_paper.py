@@ -26,15 +26,8 @@ CODES = [
 ]
 GAIN = 0.7  # η_c
 ACTOR_GAINS = (0.9, 0.4)
-PRINTED = LearnerSettings(
-    rule="gradient",
-    error="bellman",
-    safeguard=False,
-    normalizer="paper",
-    leash=0.0,
-    gain_critic=GAIN,
-    gain_actor_1=ACTOR_GAINS[0],
-    gain_actor_2=ACTOR_GAINS[1],
+PRINTED = LearnerSettings.as_printed(
+    gain_critic=GAIN, gain_actor_1=ACTOR_GAINS[0], gain_actor_2=ACTOR_GAINS[1]
 )
 
 

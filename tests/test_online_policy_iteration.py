@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 import pytest
 import scipy.linalg
-from stationkeep.online import Learner, LearnerSettings, draw_samples
+from stationkeep.online import Learner, draw_samples
 from stationkeep.online.laws import row_weights
 from stationkeep.online.learning.policy_iteration import (
     RowsUnder,
@@ -21,7 +21,7 @@ from stationkeep.online.paper import BellmanTerms
 from stationkeep.online.rows import PathRows
 from stationkeep.symbolic import Basis, Problem, RunError, ValueFunctions, growing_steps, quadratic
 
-from .games import HALF_WIDTHS, Array, linear_quadratic, two_state
+from .games import HALF_WIDTHS, Array, linear_quadratic, plain, two_state
 
 
 def kleinman(problem: Problem, P: Array, n_steps: int) -> list[Array]:
@@ -103,7 +103,7 @@ def test_online_least_squares_tends_to_its_fixed_point(leash: float) -> None:
     learner = Learner(
         problem,
         basis,
-        LearnerSettings(normalizer="paper", leash=leash, gain_critic=50.0),
+        plain(leash=leash, gain_critic=50.0),
         points,
         START,
         functions=functions,

@@ -11,9 +11,7 @@ from stationkeep.online.learning.safeguard import Certified, Safeguard, Unguarde
 from .games import TWO_STATE_WEIGHTS, Array, two_state
 
 START = np.array([0.9, 0.3, 1.5])
-COSTATE = LearnerSettings(
-    error="costate", safeguard=True, steps=400, gain_actor_1=20.0, gain_actor_2=20.0, leash=1e-6
-)
+COSTATE = LearnerSettings(steps=400, gain_actor_1=20.0, gain_actor_2=20.0, leash=1e-6)
 
 
 def learner(settings: LearnerSettings, start: Array = START) -> Learner:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...online import Controller, Policy
+from ...online import AS_PRINTED, Controller, Policy
 from ...symbolic import InputError
 from ...symbolic.errors import nearest
 from ..scenario import Scenario
@@ -18,18 +18,6 @@ from .pid import CascadedPID
 _QUADRATIC: dict[str, dict[str, Any]] = {
     "basis": {"name": "quadratic"},
     "learner": {"weights": "riccati"},
-}
-_GRADIENT: dict[str, dict[str, Any]] = {
-    "learner": {
-        "rule": "gradient",
-        "error": "bellman",
-        "safeguard": False,
-        "normalizer": "paper",
-        "leash": 0.0,
-        "gain_samples": None,
-        "gain_actor_1": 2.0,
-        "gain_actor_2": 2.0,
-    },
 }
 
 
@@ -62,7 +50,7 @@ CONTENDERS: dict[str, Contender] = {
         "nonlinear MPC, 3 s", lambda scenario: ModelPredictive(scenario.station_keeping())
     ),
     "quadratic": Contender("learned, quadratic basis", changes=_QUADRATIC),
-    "gradient": Contender("gradient law as printed", changes=_GRADIENT),
+    "gradient": Contender("gradient law as printed", changes={"learner": AS_PRINTED}),
 }
 
 

@@ -13,22 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...offline import Plant
-from ...online import Learner, LearnerSettings, draw_samples, rank_margin
+from ...online import AS_PRINTED, Learner, LearnerSettings, draw_samples, rank_margin
 from ...symbolic import Basis, Problem, RunError, quadratic
 from ...symbolic.arrays import Array
 from ..scenario import Scenario
 from .game_run import advance
 
 # the Bellman error alone, without what holds the weights
-PLAIN = {
+PLAIN = AS_PRINTED | {
     "rule": "least_squares",
-    "error": "bellman",
-    "safeguard": False,
     "normalizer": "state_cost",
-    "gain_actor_1": 2.0,
-    "gain_actor_2": 2.0,
     "forgetting": 2.0,
-    "leash": 0.0,
     "weight_factor": 0.5,
 }
 

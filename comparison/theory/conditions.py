@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from ...online import Learner, draw_samples, rank_margin
+from ...online import AS_PRINTED, Learner, draw_samples, rank_margin
 from ...online.paper import regressor_spectrum
 from ...online.vehicle import fixed_points
 from ...symbolic import StationKeeping
@@ -57,7 +57,7 @@ def check(
     learner = Learner(
         station.problem,
         station.basis,
-        scenario.learner.model_copy(update={"error": "bellman", "safeguard": False}),
+        scenario.learner.model_copy(update=AS_PRINTED),
         fixed_points(scenario.samples, station),
         station.riccati_weights,
         scenario.initial_weights(),

@@ -3,6 +3,14 @@
 from .learner import Learner
 from .learner_step import LearnerStep
 from .monitor import Monitor, MonitorSample
-from .settings import LearnerSettings, SampleSettings
+from .settings import AS_PRINTED, LearnerSettings, SampleSettings
 
-__all__ = ["Learner", "LearnerSettings", "LearnerStep", "Monitor", "MonitorSample", "SampleSettings"]
+__all__ = [
+    "AS_PRINTED",
+    "Learner",
+    "LearnerSettings",
+    "LearnerStep",
+    "Monitor",
+    "MonitorSample",
+    "SampleSettings",
+]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -16,9 +16,21 @@ from pydantic import (
 from ...symbolic.toml import Settings
 from ..laws import Normalizer
 
+AS_PRINTED: dict[str, Any] = {
+    "rule": "gradient",
+    "error": "bellman",
+    "safeguard": False,
+    "normalizer": "paper",
+    "leash": 0.0,
+    "gain_samples": None,
+    "gain_actor_1": 2.0,  # (25) asks for actors that are slow beside the critic
+    "gain_actor_2": 2.0,
+}
+"""What makes a learner that of the paper: (16)-(21) as printed, nothing that holds the weights."""
+
 
 class LearnerSettings(Settings):
-    """Actor-critic of (17)-(21).
+    """Actor-critic of (17)-(21); the defaults are what the shipped scenarios learn with.
 
     Attributes
     ----------
@@ -50,25 +62,30 @@ class LearnerSettings(Settings):
     """
 
     rule: Literal["gradient", "least_squares"] = "least_squares"
-    error: Literal["bellman", "costate"] = "bellman"
-    safeguard: bool = False
+    error: Literal["bellman", "costate"] = "costate"
+    safeguard: bool = True
     horizon: PositiveFloat = 30.0
-    steps: Annotated[int, Field(ge=10, le=2000)] = 200
-    normalizer: Normalizer = "paper"
+    steps: Annotated[int, Field(ge=10, le=2000)] = 150
+    normalizer: Normalizer = "state_cost"
     gain_critic: NonNegativeFloat = 1.0
     gain_samples: NonNegativeFloat | None = None
-    gain_actor_1: PositiveFloat = 2.0
-    gain_actor_2: PositiveFloat = 2.0
-    forgetting: NonNegativeFloat = 2.0
+    gain_actor_1: PositiveFloat = 16.0
+    gain_actor_2: PositiveFloat = 16.0
+    forgetting: NonNegativeFloat = 4.0
     covariance: PositiveFloat = 1e6
     covariance_bound: PositiveFloat = 1e8
-    leash: NonNegativeFloat = 0.0
+    leash: NonNegativeFloat = 0.001
     period: PositiveFloat = 0.25
     weights: str = "riccati"
     weights_vehicle: str | None = None
     weight_factor: float = 1.0
     reference: Literal["riccati", "initial"] = "riccati"
     weight_bound: Annotated[float, Field(gt=1.0)] = 3.0
+
+    @classmethod
+    def as_printed(cls, **changes: Any) -> LearnerSettings:
+        """Return the settings of the paper's learner, `AS_PRINTED`, with changes."""
+        return cls.model_validate(AS_PRINTED | changes)
 
     @model_validator(mode="after")
     def _consistent(self) -> LearnerSettings:
@@ -105,10 +122,10 @@ class SampleSettings(Settings):
     remember : also learn weights for the whole envelope, to be used when learning is switched off
     """
 
-    number: NonNegativeInt = 600
+    number: NonNegativeInt = 2000
     seed: NonNegativeInt = 1
     inner: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
-    spread: PositiveFloat = 0.5
-    paths: PositiveInt = 4
+    spread: PositiveFloat = 0.2
+    paths: PositiveInt = 3
     path_points: Annotated[int, Field(ge=2)] = 20
     remember: bool = False
