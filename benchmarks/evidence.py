@@ -59,7 +59,7 @@ def two_state() -> None:
     basis = Basis.build("quadratic", quadratic, problem.zeta, np.ones(2))
     samples, start = draw_samples(problem.scale, 30, 0), np.array([0.9, 0.3, 1.5])
     for rule in ("gradient", "least_squares"):
-        settings = LearnerSettings(rule=rule)  # type: ignore[arg-type]
+        settings = LearnerSettings.as_printed(rule=rule, forgetting=2.0)
         learner = Learner(problem, basis, settings, samples, ideal, start)
         for _ in range(400):
             learner.step(np.array([0.5, 0.5]), settings.period)
@@ -88,7 +88,9 @@ def linear_quadratic() -> None:
     terms = BellmanTerms.at(points, ValueFunctions(problem, basis).at(points), problem.game)
     delta = bellman_error(terms, problem.game, exact, exact, exact).delta
     print(f"LQ game, exact weights: |δ| <= {np.abs(delta / terms.state_cost).max():.1e} ζ'Qζ")
-    settings = LearnerSettings(normalizer="state_cost", weight_factor=0.5)
+    settings = LearnerSettings.as_printed(
+        rule="least_squares", normalizer="state_cost", forgetting=2.0, weight_factor=0.5
+    )
     learner = Learner(problem, basis, settings, points, exact)
     for _ in range(200):
         learner.step(0.1 * station.half_widths, settings.period)

@@ -27,13 +27,12 @@ from stationkeep.comparison.merit import GameValue, run_metrics
 from stationkeep.comparison.policies import CONTENDERS
 from stationkeep.comparison.policies.mpc import ModelPredictive, PredictionSettings
 from stationkeep.comparison.records import online_record
-from stationkeep.online import Controller, Learner, Policy, draw_samples, run
+from stationkeep.online import AS_PRINTED, Controller, Learner, Policy, draw_samples, run
 from stationkeep.online.laws import row_weights
 from stationkeep.symbolic import Kernel, Model, StationKeeping, ValueFunctions
 from stationkeep.symbolic.arrays import Array
 
 FIXED = ("learner.error=bellman", "learner.safeguard=false")
-PRINTED = ("learner.normalizer=paper", "learner.leash=0")
 FAR = (2.0, -1.0, 1.0, 0.3, -0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 ACADOS = 960.0  # us a step at a horizon of 4 s, real-time iteration; on another machine
 
@@ -123,14 +122,12 @@ def learner() -> None:
         f"{'arithmetic':>12}{'memory':>8}{'ours/bound':>12}"
     )
     for basis, number in (("quadratic", 300), ("drag", 800)):
-        scenario = Scenario.load(
-            overrides=[f"basis.name={basis}", f"samples.number={number}", *FIXED, *PRINTED]
-        )
+        scenario = Scenario.load(overrides=[f"basis.name={basis}"])
         station = scenario.station_keeping()
         points = draw_samples(station.envelope, number, 1)
         weights = station.riccati_weights
         for rule, dt in (("gradient", 0.01), ("least_squares", 0.05)):
-            settings = scenario.learner.model_copy(update={"rule": rule})
+            settings = scenario.learner.model_copy(update=AS_PRINTED | {"rule": rule})
             actor_critic = Learner(
                 station.problem, station.basis, settings, points, weights, None, station.functions
             )

@@ -111,8 +111,8 @@ def two_state() -> None:
     starts = [0.015 * np.array([0.6, -0.6, 0.6]), np.array([0.4, 0.3, 0.5]), np.array([2.5, 1.0, 0.0])]
     for error, reach in zip(starts, (0.02, 0.7, 0.7), strict=True):
         for disturbed in (True, False):
-            settings = LearnerSettings(
-                rule="gradient", gain_actor_1=gains.actor_1, gain_actor_2=gains.actor_2
+            settings = LearnerSettings.as_printed(
+                gain_actor_1=gains.actor_1, gain_actor_2=gains.actor_2
             )
             learner = Learner(problem, basis, settings, samples, W, W + error, functions)
             run = game_run(learner, reach * np.array([1.0, -1.0]), 10.0, 0.01, disturbed=disturbed)

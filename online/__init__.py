@@ -1,6 +1,14 @@
 """Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
 
-from .learning import Learner, LearnerSettings, LearnerStep, Look, Monitor, SampleSettings
+from .learning import (
+    AS_PRINTED,
+    Learner,
+    LearnerSettings,
+    LearnerStep,
+    Monitor,
+    MonitorSample,
+    SampleSettings,
+)
 from .loop import Feedback, FunctionPolicy, History, LearnedPolicy, Policy, RunSettings
 from .paper import rank_margin
 from .records import load, load_weights, save, to_dataset
@@ -21,6 +29,7 @@ from .vehicle import (
 )
 
 __all__ = [
+    "AS_PRINTED",
     "Allocation",
     "Allocator",
     "Controller",
@@ -33,8 +42,8 @@ __all__ = [
     "Learner",
     "LearnerSettings",
     "LearnerStep",
-    "Look",
     "Monitor",
+    "MonitorSample",
     "NoiseSettings",
     "Policy",
     "RunSettings",

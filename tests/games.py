@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.policies import LinearPolicy, OnVehicle
+from stationkeep.online import LearnerSettings
 from stationkeep.symbolic import (
     Basis,
     Game,
@@ -70,6 +71,11 @@ def quick_scenario(*overrides: str) -> Scenario:
     if overrides and parts <= {"learner", "samples", "simulation"}:
         scenario.__dict__["_station_keeping"] = quick_scenario().station_keeping()
     return scenario
+
+
+def plain(**changes: object) -> LearnerSettings:
+    """Least squares on the Bellman error's rows as printed, without leash and safeguard."""
+    return LearnerSettings.as_printed(**{"rule": "least_squares", "forgetting": 2.0, **changes})
 
 
 def random_weights(seed: int, m: int) -> tuple[Array, Array, Array]:

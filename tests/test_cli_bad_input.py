@@ -149,7 +149,7 @@ def test_a_message_has_no_blank_line_before_it(command: str, capsys: Capture) ->
         ("[envelope]", "[envelop]", ["unknown key 'envelop'", "did you mean 'envelope'"]),
         ("gamma = 2.0", "gamma = 2.0\ngamma = 3.0", ["not valid TOML", "line 10"]),
         ("gamma = 2.0", "gamma = 2,0", ["not valid TOML", "line 9"]),
-        ("number = 2000", "number = 2000\nfurther = 1", ["unknown key 'samples.further'"]),
+        ("[basis]", "[samples]\nfurther = 1\n\n[basis]", ["unknown key 'samples.further'"]),
     ],
 )
 def test_faults_of_a_scenario_file(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.records import online_record
-from stationkeep.online import run, save
+from stationkeep.online import LearnerSettings, SampleSettings, run, save
 from stationkeep.symbolic import InputError, Vehicle
 
 from .commands import QUICK
@@ -101,13 +101,21 @@ def test_settings_are_immutable() -> None:
         quick_scenario().samples.number = 3  # type: ignore[misc]
 
 
+@pytest.mark.parametrize("name", Scenario.shipped())
+def test_what_is_shipped_learns_with_the_defaults(name: str) -> None:
+    """A scenario file holds what differs."""
+    scenario = Scenario.load(name)
+    assert scenario.learner == LearnerSettings()
+    assert scenario.samples == SampleSettings()
+
+
 def test_files_beside_the_scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The vehicle, the basis and the weights are found from any working folder."""
     folder = tmp_path / "mine"
     changes = (
         ('vehicle = "bluerov2-heavy"', 'vehicle = "heavy.toml"'),
         ('name = "drag" ', 'name = "basis.py:more" '),
-        ("leash = 0.001 ", "weights = 'first.nc'\nleash = 0.001 "),
+        ("[simulation]", "[learner]\nweights = 'first.nc'\n\n[simulation]"),
     )
     path = write_scenario(folder, *changes)
     vehicle = (VEHICLES / "bluerov2-heavy.toml").read_text(encoding="utf-8")

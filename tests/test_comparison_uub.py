@@ -23,9 +23,10 @@ from stationkeep.comparison.theory.uub import (
     measure,
 )
 from stationkeep.online import Learner, LearnerSettings, draw_samples, rank_margin
+from stationkeep.online.laws import Equations, LeastSquares
 from stationkeep.symbolic import InputError
 
-from .games import TWO_STATE_WEIGHTS, Array, two_state
+from .games import TWO_STATE_WEIGHTS, Array, plain, two_state
 
 SAMPLES = draw_samples(np.ones(2), 100, seed=0)
 GAINS = Gains(1.0, 3.0, 2.0)
@@ -246,9 +247,7 @@ def test_without_25_there_is_no_exact_bound() -> None:
 
 def learned(start: Array, zeta0: Array, gains: Gains, *, disturbed: bool, duration: float) -> GameRun:
     problem, basis, functions = two_state()
-    settings = LearnerSettings(
-        rule="gradient",
-        normalizer="paper",
+    settings = LearnerSettings.as_printed(
         gain_critic=gains.critic,
         gain_actor_1=gains.actor_1,
         gain_actor_2=gains.actor_2,
@@ -289,17 +288,32 @@ def test_v_l_falls_from_far_outside_the_level_too(start: Array) -> None:
     assert V_L[-1] < 1e-3 * V_L[0]
 
 
+class Watched(LeastSquares):
+    """Least squares that keeps Γ^-1 of before every step."""
+
+    def __init__(self, settings: LearnerSettings) -> None:
+        super().__init__(3, settings.forgetting, settings.covariance, settings.covariance_bound)
+        self.before: list[Array] = []
+
+    def step(self, critic: Array, rows: Equations, dt: float) -> Array:
+        self.before.append(self.information)
+        return super().step(critic, rows, dt)
+
+
 @pytest.mark.parametrize("start", FAR)
 def test_v_l_of_least_squares_falls(start: Array) -> None:
     """V + W̃_c'Γ^-1 W̃_c/2 + ... along the run of least squares with forgetting."""
     problem, basis, functions = two_state()
-    settings = LearnerSettings(gain_actor_1=1.0, gain_actor_2=0.8, forgetting=1.0, covariance=10.0)
-    learner = Learner(problem, basis, settings, SAMPLES, TWO_STATE_WEIGHTS, start, functions)
+    settings = plain(gain_actor_1=1.0, gain_actor_2=0.8, forgetting=1.0, covariance=10.0)
+    law = Watched(settings)
+    learner = Learner(
+        problem, basis, settings, SAMPLES, TWO_STATE_WEIGHTS, start, functions, critic=law
+    )
     run = game_run(learner, np.array([0.7, -0.7]), 4.0, 0.01)
     errors, value = run.errors(TWO_STATE_WEIGHTS), 0.5 * run.zeta[:, 0] ** 2 + run.zeta[:, 1] ** 2
-    information = np.array([step.information for step in run.steps])
+    information = np.array(law.before)
     V_L = lyapunov(value, errors, information)
-    by_hand = [e @ step.information @ e for e, step in zip(errors[0], run.steps, strict=True)]
+    by_hand = [e @ known @ e for e, known in zip(errors[0], information, strict=True)]
     rest = np.sum(errors[1] ** 2 + errors[2] ** 2, axis=1)
     np.testing.assert_allclose(V_L, value + 0.5 * (np.array(by_hand) + rest))
     assert np.linalg.eigvalsh(information[0])[0] == pytest.approx(0.1)

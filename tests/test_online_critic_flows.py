@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from stationkeep.online.laws import LeastSquares, NormalEquations, gradient_step, row_weights
+from stationkeep.online.laws import Gradient, LeastSquares, NormalEquations, row_weights
 
 from .games import Array
 
@@ -25,18 +25,19 @@ def equations(omega: Array, cost: Array, weights: Array, critic: Array) -> Norma
 
 @pytest.mark.parametrize("size", [0.1, 1.0, 30.0])
 def test_normalised_gradient_is_the_flow_of_its_law(size: float) -> None:
-    """Ŵ_c_dot = -η_c Σ ω δ / (1 + ω'ω), η_c = 3, one row after another, for small and large ω."""
+    """Ŵ_c_dot = -η_c Σ ω δ / p, η_c = 3, one row after another, for small and large ω."""
     omega, cost = rows(1, 8, size)
 
     def law(t: float, W: Array) -> Array:
         rate = np.zeros(M)
         for regressor, local in zip(omega, cost, strict=True):
-            rate -= 3.0 * regressor * (local + regressor @ W) / (1.0 + regressor @ regressor)
+            p = np.sqrt(1.0 + regressor @ regressor)
+            rate -= 3.0 * regressor * (local + regressor @ W) / p
         return rate
 
     answer = solve_ivp(law, (0.0, 0.4), START, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-    weights = 3.0 * row_weights("squared", omega, np.ones(8), 0.0)
-    found = gradient_step(START, equations(omega, cost, weights, START), 0.4)
+    weights = 3.0 * row_weights("paper", omega, np.ones(8), 0.0)
+    found = Gradient().step(START, equations(omega, cost, weights, START), 0.4)
     np.testing.assert_allclose(found, answer, rtol=1e-9, atol=1e-10)
     assert np.abs(answer - START).max() > 0.01
 

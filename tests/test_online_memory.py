@@ -20,11 +20,12 @@ from stationkeep.online import (
     save,
     to_dataset,
 )
+from stationkeep.online.learning.memory import EnvelopeMemory
 
 from .games import TWO_STATE_WEIGHTS, Array, linear_on, quick_scenario, two_state
 
 REFERENCE = np.array([0.8, 0.2, 1.4])
-SETTINGS = LearnerSettings(error="costate", safeguard=True, steps=200)
+SETTINGS = LearnerSettings(steps=200)
 
 
 def remembering(entry: float, n_steps: int = 40) -> Learner:
@@ -46,7 +47,7 @@ def remembering(entry: float, n_steps: int = 40) -> Learner:
 def test_remembered_weights_are_optimal_in_the_whole_envelope() -> None:
     """V* = ζ_1^2 / 2 + ζ_2^2 from states that the vehicle never came near."""
     taught = remembering(1e-3, n_steps=100)
-    assert taught.memory is not None
+    assert isinstance(taught.memory, EnvelopeMemory)
     weights = taught.memory.weights
     np.testing.assert_allclose(weights[1:], TWO_STATE_WEIGHTS[1:], atol=5e-3)
     problem = two_state()[0]

@@ -10,8 +10,8 @@ from stationkeep.online import (
     History,
     Learner,
     LearnerSettings,
-    Look,
     Monitor,
+    MonitorSample,
     draw_samples,
     run,
 )
@@ -19,7 +19,7 @@ from stationkeep.online.laws import NormalEquations
 from stationkeep.online.learning.monitor import row_margin, row_rank
 from stationkeep.online.loop import fixed_points
 
-from .games import TWO_STATE_WEIGHTS, Array, quick_scenario, two_state
+from .games import TWO_STATE_WEIGHTS, Array, plain, quick_scenario, two_state
 
 START = np.array([0.9, 0.3, 1.5])
 POINTS = draw_samples(np.ones(2), 40, seed=0)
@@ -40,17 +40,17 @@ def regressors(actor_1: Array, actor_2: Array) -> tuple[Array, Array]:
     return np.array(rows), np.array(costs)
 
 
-def looks(settings: LearnerSettings, points: Array, steps: int) -> tuple[Learner, list[Look]]:
+def looks(settings: LearnerSettings, points: Array, steps: int) -> tuple[Learner, list[MonitorSample]]:
     problem, basis, functions = two_state()
     learner = Learner(problem, basis, settings, POINTS, TWO_STATE_WEIGHTS, START, functions)
     monitor = Monitor(learner, points)
     return learner, [
-        monitor.look(0.1 * i, learner.step(np.array([0.4, -0.3]), 0.1)) for i in range(steps)
+        monitor.sample(0.1 * i, learner.step(np.array([0.4, -0.3]), 0.1)) for i in range(steps)
     ]
 
 
 def test_a_look_is_of_the_weights_before_the_step() -> None:
-    settings = LearnerSettings(gain_actor_1=3.0, gain_actor_2=1.0, rule="gradient", leash=0.02)
+    settings = LearnerSettings.as_printed(gain_actor_1=3.0, gain_actor_2=1.0, leash=0.02)
     (look,) = looks(settings, POINTS, 1)[1]
     omega, cost = regressors(START, START)
     gram = sum(np.outer(row, row) / np.sqrt(1.0 + row @ row) for row in omega)
@@ -72,7 +72,7 @@ def test_a_look_is_of_the_weights_before_the_step() -> None:
 
 def test_the_margin_of_the_rows_is_with_the_state_and_the_leash() -> None:
     """(19) as printed, η_c = 2: the samples, the row at the state, and a leash of 0.02 Σ ω^2/p."""
-    settings = LearnerSettings(gain_critic=2.0, rule="gradient", leash=0.02)
+    settings = LearnerSettings.as_printed(gain_critic=2.0, leash=0.02)
     look = looks(settings, POINTS, 1)[1][0]
     omega, _ = regressors(START, START)
     leashed, _ = regressors(TWO_STATE_WEIGHTS, TWO_STATE_WEIGHTS)
@@ -108,7 +108,7 @@ def test_the_leash_decides_what_the_rows_leave(part: float) -> None:
 
 
 def test_it_follows_the_actors() -> None:
-    settings = LearnerSettings(gain_actor_1=3.0, gain_actor_2=1.0, rule="gradient")
+    settings = LearnerSettings.as_printed(gain_actor_1=3.0, gain_actor_2=1.0)
     learner, found = looks(settings, POINTS, 30)
     margins = [look.rank_margin for look in found]
     assert len(set(margins)) == len(margins)
@@ -124,30 +124,28 @@ def test_it_follows_the_actors() -> None:
 
 
 def test_without_points_18_has_no_rank() -> None:
-    look = looks(LearnerSettings(), np.zeros((0, 2)), 1)[1][0]
+    look = looks(plain(), np.zeros((0, 2)), 1)[1][0]
     assert (look.rank_margin, look.rank_bound) == (0.0, 0.0)
     assert np.isnan(look.regressor)
     assert look.row_margin > 0.0
 
 
 def test_fewer_points_than_weights_have_no_margin() -> None:
-    look = looks(LearnerSettings(), POINTS[:2], 1)[1][0]
+    look = looks(plain(), POINTS[:2], 1)[1][0]
     assert look.rank_margin == 0.0 < look.rank_bound
 
 
 def test_weights_that_are_not_finite_are_looked_at_all_the_same() -> None:
     problem, basis, functions = two_state()
-    learner = Learner(
-        problem, basis, LearnerSettings(leash=0.1), POINTS, TWO_STATE_WEIGHTS, START, functions
-    )
+    learner = Learner(problem, basis, plain(leash=0.1), POINTS, TWO_STATE_WEIGHTS, START, functions)
     learner.actor_1 = learner.actor_1 * np.nan
-    look = Monitor(learner, POINTS).look(0.0, learner.observe(np.array([0.4, -0.3])))
+    look = Monitor(learner, POINTS).sample(0.0, learner.observe(np.array([0.4, -0.3])))
     assert np.isnan([look.rank_margin, look.regressor, look.row_margin]).all()
     assert look.row_rank == 0
 
 
 def test_looking_changes_nothing() -> None:
-    settings = LearnerSettings(rule="least_squares")
+    settings = plain()
     problem, basis, functions = two_state()
     alone = Learner(problem, basis, settings, POINTS, TWO_STATE_WEIGHTS, START, functions)
     for _ in range(5):
@@ -170,7 +168,6 @@ def test_costate_rows_leave_18_alone() -> None:
     points = fixed_points(scenario.samples, scenario.station_keeping())
     bellman = quick_scenario("learner.error=bellman", "learner.safeguard=false")
     residual = Controller(bellman).learner.sample_residual()
-    assert residual is not None
     assert points.shape == (200, 12)
     normalizer = np.sqrt(1.0 + np.sum(residual.omega**2, axis=1))
     singular = np.linalg.svd(residual.omega / np.sqrt(normalizer)[:, None], compute_uv=False)

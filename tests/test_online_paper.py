@@ -26,15 +26,8 @@ CODES = [
 ]
 GAIN = 0.7  # η_c
 ACTOR_GAINS = (0.9, 0.4)
-PRINTED = LearnerSettings(
-    rule="gradient",
-    error="bellman",
-    safeguard=False,
-    normalizer="paper",
-    leash=0.0,
-    gain_critic=GAIN,
-    gain_actor_1=ACTOR_GAINS[0],
-    gain_actor_2=ACTOR_GAINS[1],
+PRINTED = LearnerSettings.as_printed(
+    gain_critic=GAIN, gain_actor_1=ACTOR_GAINS[0], gain_actor_2=ACTOR_GAINS[1]
 )
 
 
@@ -163,7 +156,6 @@ def test_the_learner_sees_the_bellman_error_of_the_page(name: str, code: str) ->
     relative = there.delta / terms(name, samples(name)).state_cost
     assert seen.sample_error == pytest.approx(np.sqrt(np.mean(relative**2)), rel=1e-10)
     kept = found.sample_residual()
-    assert kept is not None
     np.testing.assert_array_equal(kept.omega, there.omega)
     assert paper.rank_margin(kept.omega) > 0.0
 

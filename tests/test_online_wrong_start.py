@@ -39,7 +39,7 @@ COSTATE = ("learner.error=costate", "learner.safeguard=true", "learner.steps=100
 def two_state_learner(start: Array, leash: float) -> Learner:
     """Return a learner that knows nothing but its start: the reference is the start too."""
     problem, basis, functions = two_state()
-    settings = LearnerSettings(error="costate", safeguard=True, steps=400, leash=leash)
+    settings = LearnerSettings(steps=400, leash=leash)
     return Learner(problem, basis, settings, np.zeros((0, 2)), start, start, functions)
 
 
@@ -73,9 +73,7 @@ def test_a_leash_to_wrong_weights_keeps_a_part_of_the_error() -> None:
 def test_costates_find_the_riccati_solution_from_half_of_it() -> None:
     problem, basis, functions = linear_quadratic()
     exact = basis.quadratic_weights(problem.P)
-    settings = LearnerSettings(
-        error="costate", safeguard=True, steps=100, gain_actor_1=16.0, gain_actor_2=16.0
-    )
+    settings = LearnerSettings(steps=100, leash=0.0)
     start = 0.5 * exact
     taught = Learner(problem, basis, settings, np.zeros((0, 12)), start, start, functions)
     zeta = 0.3 * HALF_WIDTHS * np.random.default_rng(3).uniform(-1.0, 1.0, 12)
@@ -103,9 +101,8 @@ def test_with_its_start_as_reference_a_learner_does_not_fall_back_to_the_right_o
     for reference in ("riccati", "initial"):
         overrides = ("learner.weight_factor=0.5", f"learner.reference={reference}")
         learner = Controller(quick_scenario(*COSTATE, *overrides)).learner
-        assert learner._guard is not None
         start = (learner.actor_1, learner.actor_2)
-        fell_back.append(learner._guard.certified(state, start)[2])
+        fell_back.append(learner.guard.certified(state, start).restarted)
     assert fell_back == [True, False]
 
 

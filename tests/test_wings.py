@@ -22,7 +22,10 @@ WINGS = {
         *("arrays", "errors", "toml", "pyfile", "expressions", "integration", "compiled"),
         *("game", "value", "underwater", "textbook"),
     ),
-    "online": ("paper", "laws", "rows", "learning", "loop", "vehicle", "records", "simulate"),
+    "online": (
+        *("paper", "vector", "laws", "rows", "learning"),
+        *("loop", "vehicle", "records", "simulate"),
+    ),
     "offline": (
         *("path", "settings", "direct", "saddle", "certificate", "solve"),
         *("responses", "ideal_weights"),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...online import Controller, FunctionPolicy, LearnedPolicy, Policy, VehiclePolicy
+from ...online import AS_PRINTED, Controller, FunctionPolicy, LearnedPolicy, Policy, VehiclePolicy
 from ...symbolic import InputError, Setup, StationKeeping
 from ...symbolic.errors import nearest
 from ...symbolic.pyfile import find_callable, is_named
@@ -19,20 +19,6 @@ from .pid import CascadedPID
 _QUADRATIC: dict[str, dict[str, Any]] = {
     "basis": {"name": "quadratic"},
     "learner": {"weights": "riccati"},
-}
-_GRADIENT: dict[str, dict[str, Any]] = {
-    "learner": {
-        "rule": "gradient",
-        "error": "bellman",
-        "safeguard": False,
-        "normalizer": "paper",
-        "leash": 0.0,
-        "gain_samples": None,
-        "average_samples": False,
-        "gain_actor_1": 2.0,
-        "gain_actor_2": 2.0,
-    },
-    "samples": {"strategy": "fixed"},
 }
 
 
@@ -86,7 +72,7 @@ CONTENDERS: dict[str, Contender] = {
         suits=lambda setup: setup.problem.inverse_dynamics is not None,
     ),
     "quadratic": Contender("learned, quadratic basis", changes=_QUADRATIC),
-    "gradient": Contender("gradient law as printed", changes=_GRADIENT),
+    "gradient": Contender("gradient law as printed", changes={"learner": AS_PRINTED}),
 }
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...offline import Plant
-from ...online import Learner, LearnerSettings, draw_samples, rank_margin
+from ...online import AS_PRINTED, Learner, LearnerSettings, draw_samples, rank_margin
 from ...symbolic import Basis, Problem, RunError, Setup, quadratic
 from ...symbolic.arrays import Array
 from ..scenario import Scenario
@@ -23,15 +23,10 @@ from .pace import pace
 from .words import subject
 
 # the Bellman error alone, without what holds the weights
-PLAIN: dict[str, Any] = {
+PLAIN: dict[str, Any] = AS_PRINTED | {
     "rule": "least_squares",
-    "error": "bellman",
-    "safeguard": False,
     "normalizer": "state_cost",
-    "gain_actor_1": 2.0,
-    "gain_actor_2": 2.0,
     "forgetting": 2.0,
-    "leash": 0.0,
     "weight_factor": 0.5,
 }
 
@@ -150,8 +145,7 @@ def excitation_run(
         spectrum = np.linalg.eigvalsh(gram)
         excited = float(np.sum(spectrum > 1e-6 * max(spectrum[-1], 1e-300)))
         error = float(np.linalg.norm(learner.critic - ideal) / np.linalg.norm(ideal))
-        residual = learner.sample_residual()
-        margin = 0.0 if residual is None else rank_margin(residual.omega)
+        margin = rank_margin(learner.sample_residual().omega)
         rows.append((i * dt, excited, margin, error))
         try:
             learner.step(zeta, dt)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ...offline import Plant
-from ...online import Learner, draw_samples, rank_margin
+from ...online import AS_PRINTED, Learner, draw_samples, rank_margin
 from ...online.loop import fixed_points
 from ...online.paper import regressor_spectrum
 from ...symbolic import Setup, StationKeeping
@@ -38,14 +38,14 @@ def scenario_conditions(
     learner = Learner(
         setup.problem,
         setup.basis,
-        scenario.learner.model_copy(update={"error": "bellman", "safeguard": False}),
+        scenario.learner.model_copy(update=AS_PRINTED),
         fixed_points(scenario.samples, setup),
         setup.riccati_weights,
         scenario.initial_weights(),
         setup.functions,
     )
     residual = learner.sample_residual()
-    margin = 0.0 if residual is None else rank_margin(residual.omega)
+    margin = rank_margin(residual.omega)
     margin = margin if c_lower is None else min(margin, c_lower)
     return [
         *_own(scenario, setup),
@@ -81,7 +81,7 @@ def _representation(bounds: Bounds | None, n: int) -> Condition:
 def _samples(scenario: Scenario, learner: Learner) -> list[Condition]:
     residual = learner.sample_residual()
     m = learner.basis.n_basis
-    if residual is None:
+    if not len(residual):
         none = "there are no samples; give samples.number"
         return [Condition("rank of (18) is m", "(18), Assumption 4", 0.0, float(m), False, none)]
     spectrum = regressor_spectrum(residual.omega)

@@ -1,25 +1,17 @@
-"""The laws (19)-(21): critic and actors, exact over a step with frozen rows."""
+"""The laws (19)-(21) over a step: critic and actors, exact with frozen rows."""
 
 from .actor import actor_step
-from .critic import (
-    Equations,
-    LeastSquares,
-    NormalEquations,
-    Normalizer,
-    exact_flow,
-    gradient_step,
-    row_weights,
-)
-from .vector_code import library
+from .critic import Critic, Gradient, LeastSquares
+from .equations import Equations, NormalEquations, Normalizer, exact_flow, row_weights
 
 __all__ = [
+    "Critic",
     "Equations",
+    "Gradient",
     "LeastSquares",
     "NormalEquations",
     "Normalizer",
     "actor_step",
     "exact_flow",
-    "gradient_step",
-    "library",
     "row_weights",
 ]

@@ -2,7 +2,15 @@
 
 from .learner import Learner
 from .learner_step import LearnerStep
-from .monitor import Look, Monitor
-from .settings import LearnerSettings, SampleSettings
+from .monitor import Monitor, MonitorSample
+from .settings import AS_PRINTED, LearnerSettings, SampleSettings
 
-__all__ = ["Learner", "LearnerSettings", "LearnerStep", "Look", "Monitor", "SampleSettings"]
+__all__ = [
+    "AS_PRINTED",
+    "Learner",
+    "LearnerSettings",
+    "LearnerStep",
+    "Monitor",
+    "MonitorSample",
+    "SampleSettings",
+]

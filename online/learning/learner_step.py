@@ -22,7 +22,6 @@ class LearnerStep:
         the predicted paths; NaN without samples
     projecting : whether the smooth projection acts on an actor
     rows : what the critic learns from, state, samples and leash
-    information : (m, m) Γ^-1 of least squares before the step
     predicted_cost : J of the policy in use before the actors moved; NaN without safeguard
     accepted : part of the actors' step that was certified; 1 without safeguard
     fallback : whether the policy in use after the step is that of the reference weights or the linear
@@ -37,7 +36,6 @@ class LearnerStep:
     sample_error: float
     projecting: bool
     rows: Equations
-    information: Array
     predicted_cost: float = np.nan
     accepted: float = 1.0
     fallback: bool = False

@@ -16,14 +16,14 @@ How good they become is decided by the number of paths behind a fit: a few hundr
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 import scipy.linalg
 
 from ...symbolic.arrays import Array
 from ..rows import PathRows, draw_samples
-from .safeguard import FRACTIONS
+from .safeguard import FRACTIONS, Costs
 
 PATHS = 8  # a step
 FORGETTING = 0.02  # of a step, so that a fit sees about 400 paths
@@ -32,13 +32,35 @@ N_VALIDATION = 48
 LEASH = 1e-5
 
 
-class Memory:
+class Memory(Protocol):
+    """What is kept beside the critic."""
+
+    @property
+    def weights(self) -> Array | None:
+        """Weights for the whole envelope, shape (m,), or None."""
+        ...
+
+    def step(self) -> None:
+        """Learn once more."""
+        ...
+
+
+class NoMemory:
+    """A memory that remembers nothing."""
+
+    weights: Array | None = None
+
+    def step(self) -> None:
+        """Do nothing."""
+
+
+class EnvelopeMemory:
     """Weights that are good from the whole envelope, improved while the vehicle is elsewhere.
 
     Parameters
     ----------
     path_rows : rows along predicted paths, relative to the whole cost of each
-    predicted_cost : J from a state under actor weights
+    costs : predicted, under actor weights
     envelope : (n,) half-widths of the starts
     reference : (m,) weights to start from, and of the leash
     seed : of the starts
@@ -52,24 +74,24 @@ class Memory:
     def __init__(
         self,
         path_rows: PathRows,
-        predicted_cost: Callable[[Array, Array, Array], float],
+        costs: Costs,
         envelope: Array,
         reference: Array,
         *,
         seed: int,
     ) -> None:
         self._path_rows = path_rows
-        self._cost = predicted_cost
+        self._costs = costs
         self._envelope = envelope
         self._reference = reference
         self._rng = np.random.default_rng([seed, 1])
         m = len(reference)
         self._matrix, self._vector = np.zeros((m, m)), np.zeros(m)
         self._n_steps = 0
-        self.weights = reference
+        self.weights: Array = reference
         states = draw_samples(envelope, N_VALIDATION, int(self._rng.integers(2**31)))
-        costs = [(state, predicted_cost(state, reference, reference)) for state in states]
-        self._validation = [(state, cost) for state, cost in costs if 0.0 < cost < np.inf]
+        found = [(state, costs.cost(state, reference, reference)) for state in states]
+        self._validation = [(state, cost) for state, cost in found if 0.0 < cost < np.inf]
         self.relative_cost = 1.0
 
     def step(self) -> None:
@@ -77,12 +99,10 @@ class Memory:
         self._matrix *= 1.0 - FORGETTING
         self._vector *= 1.0 - FORGETTING
         for start in draw_samples(self._envelope, PATHS, int(self._rng.integers(2**31))):
-            rows = self._path_rows.at(start[None, :], self.weights, self.weights)
-            if rows is not None:
-                omega, target, weight = rows
-                weighted = omega * weight[:, None]
-                self._matrix += weighted.T @ omega
-                self._vector += weighted.T @ target
+            omega, target, weight = self._path_rows.at(start[None, :], self.weights, self.weights)
+            weighted = omega * weight[:, None]
+            self._matrix += weighted.T @ omega
+            self._vector += weighted.T @ target
         self._n_steps += 1
         if self._n_steps % EVERY == 0 and self._validation and self._matrix.any():
             self._improve()
@@ -103,7 +123,7 @@ class Memory:
         """Return the mean of J / J_ref over the validation states, infinite once it can't be lower."""
         total, n = 0.0, len(self._validation)
         for state, cost in self._validation:
-            total += self._cost(state, weights, weights) / cost / n
+            total += self._costs.cost(state, weights, weights) / cost / n
             if total >= self.relative_cost:
                 return np.inf
         return total

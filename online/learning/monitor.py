@@ -1,4 +1,4 @@
-"""What the proof asks of a learning run, looked at while it runs.
+"""What the proof asks of a learning run, watched while it runs.
 
 (18) is about the regressors ω_j at fixed points ζ_j and the actor weights of the moment, whatever rows
 the critic learns from: c_lower = λ_min(Σ ω_j ω_j' / p_j), p_j = sqrt(1 + ω_j'ω_j). It moves with the
@@ -9,12 +9,14 @@ from, M = η_c Σ w ω ω' + diag(ρ), its rows and the leash, each weight in it
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ...symbolic.arrays import Array
 from ..laws import Equations
 from ..paper import BellmanTerms, Residual, bellman_error, regressor_spectrum
+from ..rows import terms_at
 from .learner import Learner
 from .learner_step import LearnerStep
 
@@ -22,8 +24,8 @@ BLOCK = 100  # points that are evaluated together
 
 
 @dataclass(frozen=True)
-class Look:
-    """What one look shows, under the weights that the learning step saw.
+class MonitorSample:
+    """What the monitor sees at one time, under the weights that the learning step saw.
 
     Attributes
     ----------
@@ -51,7 +53,7 @@ class Look:
 
 
 class Monitor:
-    """Look at a learner.
+    """Watch a learner.
 
     Parameters
     ----------
@@ -62,13 +64,12 @@ class Monitor:
     def __init__(self, learner: Learner, points: Array) -> None:
         self._learner = learner
         self._points = points
-        self._terms: BellmanTerms | None = None
 
-    def look(self, time: float, seen: LearnerStep) -> Look:
-        """Return what the weights of a learning step at `time` [s] look like."""
+    def sample(self, time: float, seen: LearnerStep) -> MonitorSample:
+        """Return what the weights of a learning step at `time` [s] are like."""
         actors = np.array([seen.actor_1, seen.actor_2])
         norm = np.linalg.norm(seen.critic)
-        return Look(
+        return MonitorSample(
             time=time,
             row_margin=row_margin(seen.rows),
             row_rank=row_rank(seen.rows),
@@ -85,7 +86,7 @@ class Monitor:
             return {"rank_margin": np.nan, "rank_bound": np.nan} | dict.fromkeys(_ERRORS, np.nan)
         spectrum = regressor_spectrum(residual.omega)
         size = float(np.linalg.norm(residual.omega, axis=1).max())
-        relative = residual.delta / self._point_terms().state_cost
+        relative = residual.delta / self._terms.state_cost
         few = len(self._points) < residual.omega.shape[1]
         return {
             "rank_margin": 0.0 if few else float(max(spectrum[0], 0.0)),
@@ -98,23 +99,21 @@ class Monitor:
 
     def _residual(self, seen: LearnerStep) -> Residual:
         weights = (seen.critic, seen.actor_1, seen.actor_2)
-        return bellman_error(self._point_terms(), self._learner.game, *weights)
+        return bellman_error(self._terms, self._learner.game, *weights)
 
-    def _point_terms(self) -> BellmanTerms:
-        """Return what the points alone decide, evaluated at the first look.
+    @cached_property
+    def _terms(self) -> BellmanTerms:
+        """What the points alone decide.
 
         In blocks: a kernel for all the points takes 0.3 s to build, one for a block 10 ms.
         """
-        if self._terms is None:
-            functions, game = self._learner.functions, self._learner.game
-            blocks = [self._points[i : i + BLOCK] for i in range(0, len(self._points), BLOCK)]
-            parts = [BellmanTerms.at(block, functions.at(block), game) for block in blocks]
-            self._terms = BellmanTerms(
-                state_cost=np.concatenate([part.state_cost for part in parts]),
-                sigma_f=np.concatenate([part.sigma_f for part in parts]),
-                sigma_g=np.concatenate([part.sigma_g for part in parts]),
-            )
-        return self._terms
+        blocks = [self._points[i : i + BLOCK] for i in range(0, len(self._points), BLOCK)]
+        parts = [terms_at(self._learner.functions, block) for block in blocks]
+        return BellmanTerms(
+            state_cost=np.concatenate([part.state_cost for part in parts]),
+            sigma_f=np.concatenate([part.sigma_f for part in parts]),
+            sigma_g=np.concatenate([part.sigma_g for part in parts]),
+        )
 
 
 def row_margin(rows: Equations) -> float:

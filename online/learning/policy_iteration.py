@@ -26,7 +26,7 @@ from ..paper import BellmanTerms, bellman_error
 from ..rows import PathRows
 
 Rows = tuple[Array, Array, Array]  # ω (N, m), r (N,), w (N,)
-RowsUnder = Callable[[Array], Rows | None]
+RowsUnder = Callable[[Array], Rows]
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,9 @@ def bellman_rows(
 def costate_rows(path_rows: PathRows, starts: Array) -> RowsUnder:
     """Return the rows of the costate error along the paths from `starts` (N, n), likewise."""
 
-    def under(weights: Array) -> Rows | None:
-        rows = path_rows.at(starts, weights, weights)
-        return None if rows is None else (rows[0], -rows[1], rows[2])
+    def under(weights: Array) -> Rows:
+        omega, target, row_weights = path_rows.at(starts, weights, weights)
+        return omega, -target, row_weights
 
     return under
 
@@ -100,7 +100,7 @@ def policy_iteration(
 
     Parameters
     ----------
-    rows_under : the rows under the policy of weights (m,), None where it gives none
+    rows_under : the rows under the policy of weights (m,)
     leash, reference : of every fit
     tolerance : of |W_{k+1} - W_k|, relative to |W_{k+1}|
     most : iterations
@@ -113,7 +113,7 @@ def policy_iteration(
     iterates = [np.asarray(start, dtype=float)]
     for k in range(most):
         rows = rows_under(iterates[-1])
-        if rows is None or not all(np.all(np.isfinite(part)) for part in rows):
+        if not len(rows[1]) or not all(np.all(np.isfinite(part)) for part in rows):
             raise RunError(
                 f"policy iteration has no rows after {k} steps: the policy loses the vehicle; start "
                 "from weights whose policy is stable"

@@ -16,8 +16,8 @@ Bertsekas 2017, Dynamic Programming and Optimal Control I, 6.4.)
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -27,44 +27,115 @@ Actors = tuple[Array, Array]
 FRACTIONS = (1.0, 0.5, 0.25, 0.1)
 
 
+class Certified(NamedTuple):
+    """What a step goes on from.
+
+    actors : each (m,); cost : J of them, NaN if nothing was predicted; restarted : whether they are the
+    reference, which was predicted to cost less than the actors before
+    """
+
+    actors: Actors
+    cost: float
+    restarted: bool
+
+
+class Accepted(NamedTuple):
+    """What a step ends with.
+
+    actors : each (m,); part : of the way to what was proposed; cost : J of them, NaN if nothing was
+    predicted; linear : whether the linear H-infinity policy is predicted to cost less
+    """
+
+    actors: Actors
+    part: float
+    cost: float
+    linear: bool
+
+
+class Guard(Protocol):
+    """Who decides how far the actors move."""
+
+    def certified(self, zeta: Array, actors: Actors) -> Certified:
+        """Return the actors to go on from at ζ (n,)."""
+        ...
+
+    def accepted(self, zeta: Array, start: Certified, proposed: Actors) -> Accepted:
+        """Return the actors at ζ (n,) after a step from `start` to what the laws propose."""
+        ...
+
+    def kept(self, zeta: Array, start: Certified) -> Accepted:
+        """Return the actors at ζ (n,) where none is taken."""
+        ...
+
+
+class Unguarded:
+    """A guard that lets every step pass, and predicts nothing."""
+
+    def certified(self, zeta: Array, actors: Actors) -> Certified:
+        """Return the actors as they are."""
+        return Certified(actors, np.nan, restarted=False)
+
+    def accepted(self, zeta: Array, start: Certified, proposed: Actors) -> Accepted:
+        """Return what is proposed."""
+        return Accepted(proposed, 1.0, np.nan, linear=False)
+
+    def kept(self, zeta: Array, start: Certified) -> Accepted:
+        """Return the actors as they are."""
+        return Accepted(start.actors, 0.0, np.nan, linear=False)
+
+
+class Costs(Protocol):
+    """Predicted costs from a state; `rows.Predictor` is one."""
+
+    def cost(self, zeta: Array, actor_1: Array, actor_2: Array) -> float:
+        """Return J(ζ; Ŵ_a1, Ŵ_a2), infinite for a policy that loses the vehicle."""
+        ...
+
+    def linear_cost(self, zeta: Array) -> float:
+        """Return J(ζ) of the linear H-infinity policy."""
+        ...
+
+
 @dataclass(frozen=True)
 class Safeguard:
     """Accept or refuse new actor weights by their predicted cost.
 
     Attributes
     ----------
-    predicted_cost : J(ζ; Ŵ_a1, Ŵ_a2), infinite for a policy that loses the vehicle
+    costs : predicted
     reference : (m,) weights to go back to
-    linear_cost : J(ζ) of the linear H-infinity policy; infinite where that is not to be used
+    may_use_linear : whether the linear H-infinity policy is known
     """
 
-    predicted_cost: Callable[[Array, Array, Array], float]
+    costs: Costs
     reference: Array
-    linear_cost: Callable[[Array], float] = lambda zeta: np.inf
+    may_use_linear: bool = True
 
-    def certified(self, zeta: Array, actors: Actors) -> tuple[Actors, float, bool]:
-        """Return the actors to go on from at ζ (n,), J of them, and whether they are the reference.
-
-        They are when its J is lower.
-        """
-        cost = self.predicted_cost(zeta, *actors)
-        restart = self.predicted_cost(zeta, self.reference, self.reference)
+    def certified(self, zeta: Array, actors: Actors) -> Certified:
+        """Return the actors to go on from at ζ (n,): the reference when its J is lower."""
+        cost = self.costs.cost(zeta, *actors)
+        restart = self.costs.cost(zeta, self.reference, self.reference)
         if restart < cost:
-            return (self.reference, self.reference), restart, True
-        return actors, cost, False
+            return Certified((self.reference, self.reference), restart, restarted=True)
+        return Certified(actors, cost, restarted=False)
 
-    def accepted(
-        self, zeta: Array, actors: Actors, proposed: Actors, cost: float
-    ) -> tuple[Actors, float, float]:
-        """Return the actors after the largest certified part of the way to `proposed`, it and their J.
+    def accepted(self, zeta: Array, start: Certified, proposed: Actors) -> Accepted:
+        """Return the actors after the largest certified part of the way to `proposed`.
 
-        `cost`: J of the present actors at ζ (n,), which has to fall.
+        That is the first that lowers J at ζ (n,).
         """
-        for fraction in FRACTIONS:
-            tried = tuple(
-                old + fraction * (new - old) for old, new in zip(actors, proposed, strict=True)
+        for part in FRACTIONS:
+            control, disturbance = (
+                old + part * (new - old) for old, new in zip(start.actors, proposed, strict=True)
             )
-            reached = self.predicted_cost(zeta, *tried)
-            if reached < cost:
-                return (tried[0], tried[1]), fraction, reached
-        return actors, 0.0, cost
+            reached = self.costs.cost(zeta, control, disturbance)
+            if reached < start.cost:
+                return Accepted((control, disturbance), part, reached, self._linear(zeta, reached))
+        return self.kept(zeta, start)
+
+    def kept(self, zeta: Array, start: Certified) -> Accepted:
+        """Return the actors as they are, or the linear policy where it costs less at ζ (n,)."""
+        return Accepted(start.actors, 0.0, start.cost, self._linear(zeta, start.cost))
+
+    def _linear(self, zeta: Array, cost: float) -> bool:
+        return self.may_use_linear and self.costs.linear_cost(zeta) < cost

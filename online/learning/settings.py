@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -15,11 +15,22 @@ from pydantic import (
 
 from ...symbolic.toml import Settings
 from ..laws import Normalizer
-from ..rows import Strategy
+
+AS_PRINTED: dict[str, Any] = {
+    "rule": "gradient",
+    "error": "bellman",
+    "safeguard": False,
+    "normalizer": "paper",
+    "leash": 0.0,
+    "gain_samples": None,
+    "gain_actor_1": 2.0,  # (25) asks for actors that are slow beside the critic
+    "gain_actor_2": 2.0,
+}
+"""What makes a learner that of the paper: (16)-(21) as printed, nothing that holds the weights."""
 
 
 class LearnerSettings(Settings):
-    """Actor-critic of (17)-(21).
+    """Actor-critic of (17)-(21); the defaults are what the shipped scenarios learn with.
 
     Attributes
     ----------
@@ -34,7 +45,6 @@ class LearnerSettings(Settings):
     normalizer : weight of a row; `paper` is 1/p as printed, see `critic.row_weights`
     gain_critic : η_c of the row at the state [1/s]
     gain_samples : η_c of the sample rows [1/s]; as gain_critic when not given
-    average_samples : divide the sum over the samples by N
     gain_actor_1, gain_actor_2 : η_a1, η_a2 of (20)(21) [1/s]
     forgetting : β of least squares [1/s]
     covariance, covariance_bound : Γ(0) and Γ_max as multiples of the identity
@@ -52,26 +62,30 @@ class LearnerSettings(Settings):
     """
 
     rule: Literal["gradient", "least_squares"] = "least_squares"
-    error: Literal["bellman", "costate"] = "bellman"
-    safeguard: bool = False
+    error: Literal["bellman", "costate"] = "costate"
+    safeguard: bool = True
     horizon: PositiveFloat = 30.0
-    steps: Annotated[int, Field(ge=10, le=2000)] = 200
-    normalizer: Normalizer = "paper"
+    steps: Annotated[int, Field(ge=10, le=2000)] = 150
+    normalizer: Normalizer = "state_cost"
     gain_critic: NonNegativeFloat = 1.0
     gain_samples: NonNegativeFloat | None = None
-    average_samples: bool = False
-    gain_actor_1: PositiveFloat = 2.0
-    gain_actor_2: PositiveFloat = 2.0
-    forgetting: NonNegativeFloat = 2.0
+    gain_actor_1: PositiveFloat = 16.0
+    gain_actor_2: PositiveFloat = 16.0
+    forgetting: NonNegativeFloat = 4.0
     covariance: PositiveFloat = 1e6
     covariance_bound: PositiveFloat = 1e8
-    leash: NonNegativeFloat = 0.0
+    leash: NonNegativeFloat = 0.001
     period: PositiveFloat = 0.25
     weights: str = "riccati"
     weights_vehicle: str | None = None
     weight_factor: float = 1.0
     reference: Literal["riccati", "initial"] = "riccati"
     weight_bound: Annotated[float, Field(gt=1.0)] = 3.0
+
+    @classmethod
+    def as_printed(cls, **changes: Any) -> LearnerSettings:
+        """Return the settings of the paper's learner, `AS_PRINTED`, with changes."""
+        return cls.model_validate(AS_PRINTED | changes)
 
     @model_validator(mode="after")
     def _consistent(self) -> LearnerSettings:
@@ -98,24 +112,20 @@ class SampleSettings(Settings):
 
     Attributes
     ----------
-    strategy : `fixed` in the envelope, `shrinking` with the state, or along the predicted `trajectory`
-    number : N of the points
+    number : N of the points, fixed in the envelope
     seed : of everything that is drawn
-    inner : fixed and shrinking points are shrunk by a factor uniform on (inner, 1), so that some lie
-        near the origin
-    spread : of moving points around the state or the trajectory, as a part of its largest scaled entry
-    ahead : part of the predicted trajectory that the points follow [s]
+    inner : the points are shrunk by a factor uniform on (inner, 1), so that some lie near the origin
+    spread : of the starts of predicted trajectories around the state, as a part of its largest scaled
+        entry
     paths : trajectories predicted for `costate` rows, the first from the state itself
     path_points : points of each that give rows
     remember : also learn weights for the whole envelope, to be used when learning is switched off
     """
 
-    strategy: Strategy = "fixed"
-    number: NonNegativeInt = 600
+    number: NonNegativeInt = 2000
     seed: NonNegativeInt = 1
     inner: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
-    spread: PositiveFloat = 0.5
-    ahead: PositiveFloat = 12.0
-    paths: PositiveInt = 4
+    spread: PositiveFloat = 0.2
+    paths: PositiveInt = 3
     path_points: Annotated[int, Field(ge=2)] = 20
     remember: bool = False

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from ...symbolic import Problem
 from ...symbolic.arrays import Array
-from ..learning import Look
+from ..learning import MonitorSample
 
 
 @dataclass
@@ -36,7 +36,7 @@ class History:
     critic: list[Array] = field(default_factory=list)
     actor_1: list[Array] = field(default_factory=list)
     actor_2: list[Array] = field(default_factory=list)
-    looks: list[Look] = field(default_factory=list)
+    looks: list[MonitorSample] = field(default_factory=list)
     remembered: Array | None = None
     stopped: str | None = None
     wall_seconds: float = 0.0

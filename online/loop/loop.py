@@ -145,7 +145,7 @@ class _Loop(Generic[P]):
         history = self.history
         if self.monitor and (last or self.t >= self.next_look - 1e-9):
             self.next_look = self.t + self.system.settings.monitor_period
-            history.looks.append(self.monitor.look(self.t, seen))
+            history.looks.append(self.monitor.sample(self.t, seen))
         history.learn_time.append(self.t)
         history.bellman_error.append(seen.bellman_error)
         history.sample_error.append(seen.sample_error)
@@ -163,5 +163,4 @@ class _Loop(Generic[P]):
         learned = self.learned
         if learned is not None and learned.learn:
             self._record_learner(learned.learner.observe(learned.zeta), last=True)
-            memory = learned.learner.memory
-            self.history.remembered = None if memory is None else memory.weights
+            self.history.remembered = learned.learner.memory.weights

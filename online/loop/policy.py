@@ -9,7 +9,7 @@ import numpy as np
 from ...symbolic import InputError, Setup
 from ...symbolic.arrays import Array
 from ..learning import Learner, LearnerSettings, LearnerStep, SampleSettings
-from ..rows import FixedSamples, SampleStrategy, ShrinkingSamples, TrajectorySamples, draw_samples
+from ..rows import draw_samples
 
 
 class Policy(Protocol):
@@ -81,13 +81,12 @@ class LearnedPolicy:
         setup = scenario.setup()
         self.learn = learn
         reference, weights = _start(scenario, setup)
+        points = fixed_points(scenario.samples, setup)
         self.learner = Learner(
             setup.problem,
             setup.basis,
             scenario.learner,
-            sample_strategy(scenario.samples, setup)
-            if learn
-            else np.zeros((0, setup.problem.n_states)),
+            points if learn else points[:0],
             reference,
             weights,
             setup.functions,
@@ -141,23 +140,6 @@ def _start(scenario: LearnerScenario, setup: Setup) -> tuple[Array, Array | None
     return start, start
 
 
-def sample_strategy(settings: SampleSettings, setup: Setup) -> SampleStrategy:
-    """Return the strategy that the settings name."""
-    if settings.strategy == "trajectory":
-        return TrajectorySamples(
-            setup.half_widths,
-            settings.number,
-            settings.seed,
-            spread=settings.spread,
-            ahead=settings.ahead,
-        )
-    if settings.strategy == "shrinking":
-        box, inner = setup.half_widths, settings.inner
-        points = draw_samples(box, settings.number, settings.seed, inner=inner)
-        return ShrinkingSamples(points, box, settings.spread)
-    return FixedSamples(fixed_points(settings, setup))
-
-
 def fixed_points(settings: SampleSettings, setup: Setup) -> Array:
-    """Return the fixed ζ_j of (18), in the envelope, whatever the strategy, shape (N, n)."""
+    """Return the fixed ζ_j of (18), in the envelope, shape (N, n)."""
     return draw_samples(setup.envelope, settings.number, settings.seed, inner=settings.inner)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from ...symbolic import InputError, Problem
 from ...symbolic.arrays import Array
-from ..learning import Look
+from ..learning import MonitorSample
 from ..loop import History
 from ..vehicle import VehicleHistory
 from .files import load, versions
@@ -113,7 +113,7 @@ def _variables(
     }
 
 
-def _looks(looks: list[Look]) -> dict[str, tuple[tuple[str, ...], Array, str]]:
+def _looks(looks: list[MonitorSample]) -> dict[str, tuple[tuple[str, ...], Array, str]]:
     """Return dimensions, values and unit of what the monitor saw."""
     units = {
         **dict.fromkeys(("rank_margin", "rank_bound", "row_margin", "row_rank"), "1"),

@@ -1,30 +1,25 @@
 """What the critic learns from: rows of the Bellman error (17), or of the costate error."""
 
-from .samples import (
-    FixedSamples,
-    SampleStrategy,
-    ShrinkingSamples,
-    Strategy,
-    TrajectorySamples,
-    draw_samples,
-)
-from .sources import BellmanSource, CostateSource, PathRows, RelativeTo, RowSource, SampleRows, Weights
-from .vector_rows import RowGains, VectorRows
+from .bellman import BellmanRows, VectorBellmanRows, bellman_source
+from .costate import CostateRows
+from .paths import PathRows, RelativeTo
+from .predictor import Predictor
+from .samples import draw_samples
+from .source import Leash, Observation, RowGains, RowSource, Weights, terms_at
 
 __all__ = [
-    "BellmanSource",
-    "CostateSource",
-    "FixedSamples",
+    "BellmanRows",
+    "CostateRows",
+    "Leash",
+    "Observation",
     "PathRows",
+    "Predictor",
     "RelativeTo",
     "RowGains",
     "RowSource",
-    "SampleRows",
-    "SampleStrategy",
-    "ShrinkingSamples",
-    "Strategy",
-    "TrajectorySamples",
-    "VectorRows",
+    "VectorBellmanRows",
     "Weights",
+    "bellman_source",
     "draw_samples",
+    "terms_at",
 ]

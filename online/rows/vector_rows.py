@@ -1,6 +1,6 @@
 """The Bellman error's rows and the critic's sums in compiled vector code, `vector_rows.c`.
 
-It computes what `paper.bellman_error`, `critic.row_weights` and `critic.NormalEquations` do in numpy,
+It computes what `paper.bellman_error`, `laws.row_weights` and `laws.NormalEquations` do in numpy,
 from σ' and g without their zeros, for the samples and the state at once. The gradient law's flow
 
     y_dot = -A y + b,  y(0) = 0,    A = η Σ w ω ω' + leash >= 0,    b = η Σ w ω δ
@@ -26,10 +26,11 @@ import numpy as np
 from ...symbolic import ValueFunctions
 from ...symbolic.arrays import Array
 from ..laws import Normalizer, exact_flow
+from .source import Observation, RowGains, Weights
 
 TOLERANCE = 1e-11  # of the Krylov flow, relative to its length
 _MOST = 64  # Lanczos vectors, as in the C code
-_NORMALIZERS: tuple[Normalizer, ...] = ("paper", "squared", "state_cost")
+_NORMALIZERS: tuple[Normalizer, ...] = ("paper", "state_cost")
 _INTEGERS = ("blocks", "m", "n", "k", "entries", "normalizer")
 _INDICES = ("column", "row", "input", "state")
 _ARRAYS = (
@@ -61,22 +62,6 @@ def _aligned(*shape: int) -> Array:
     return raw[start : start + size].reshape(shape)
 
 
-@dataclass(frozen=True)
-class RowGains:
-    """η_c and the kind of the row weights.
-
-    Attributes
-    ----------
-    state, samples : η_c of the row at the state and of every sample's [1/s]
-    normalizer, floor : of `critic.row_weights`
-    """
-
-    state: float
-    samples: float
-    normalizer: Normalizer
-    floor: float
-
-
 class VectorRows:
     """Rows of (17) at N samples and at the state, under changing weights.
 
@@ -84,14 +69,15 @@ class VectorRows:
     ----------
     functions : of problem and basis
     compiled : the C code
-    n_samples : N
+    points : (N, n) samples, N >= 1
     gains : of the rows
     """
 
     def __init__(
-        self, functions: ValueFunctions, compiled: ctypes.CDLL, n_samples: int, gains: RowGains
+        self, functions: ValueFunctions, compiled: ctypes.CDLL, points: Array, gains: RowGains
     ) -> None:
-        self._functions, self._library, self._n_samples = functions, compiled, n_samples
+        n_samples = len(points)
+        self._library, self._n_samples = compiled, n_samples
         layout, problem, m = functions.term_layout, functions.problem, functions.basis.n_basis
         lanes = ctypes.c_longlong.in_dll(compiled, "lanes").value
         blocks, width = 2 * -(-(n_samples + 1) // (2 * lanes)), 8 * -(-m // 8)
@@ -117,27 +103,24 @@ class VectorRows:
         state_block, state_lane = divmod(n_samples, lanes)
         self._terms, self._lanes = per_block["terms"], lanes
         self._here = per_block["terms"][state_block, :, state_lane]
-        self._state_cost = np.ones(n_samples)
         self._vectors = _aligned(6, width)  # critic, both actors, gradient, leash, flow
         self._pointers = [int(row.ctypes.data) for row in self._vectors]
         self._krylov = _aligned(_MOST + 1, width)
         self._matrix = _aligned(width, width)
         self._address = ctypes.addressof(self._table)
         self._point = functions.terms
+        self._state_cost = self._place(*functions.many_terms(points))
 
-    def place(self, points: Array) -> None:
-        """Evaluate the terms at the sample points (N, n)."""
-        (terms,) = self._functions.many_terms(points)
+    def _place(self, terms: Array) -> Array:
+        """Put the terms at the samples (N, entries) into the lanes; return ζ'Qζ, shape (N,)."""
         by_lane = self._terms.transpose(0, 2, 1)
-        whole = len(points) // self._lanes
+        whole = len(terms) // self._lanes
         inside = whole * self._lanes
         by_lane[:whole] = terms[:inside].reshape(whole, self._lanes, terms.shape[1])
-        by_lane[whole, : len(points) - inside] = terms[inside:]
-        self._state_cost = terms[:, -1].copy()
+        by_lane[whole, : len(terms) - inside] = terms[inside:]
+        return np.array(terms[:, -1])
 
-    def observe(
-        self, zeta: Array, weights: tuple[Array, Array, Array], leash: Array, reference: Array
-    ) -> tuple[float, float, VectorEquations]:
+    def observe(self, zeta: Array, weights: Weights, leash: Array, reference: Array) -> Observation:
         """Return δ at ζ (n,), the rms of δ_j / ζ_j'Qζ_j, and the equations of the critic.
 
         The equations hold until the next call.
@@ -159,11 +142,8 @@ class VectorRows:
         vectors[3, :m] += leash * (weights[0] - reference)
         relative = self._delta[: self._n_samples] / self._state_cost
         error = float(np.sqrt(relative @ relative / self._n_samples))
-        return (
-            float(self._delta[self._n_samples]),
-            error,
-            VectorEquations(self, vectors[3, :m].copy(), leash),
-        )
+        equations = VectorEquations(self, vectors[3, :m].copy(), leash)
+        return Observation(float(self._delta[self._n_samples]), error, equations)
 
     def flow(self, dt: float) -> Array | None:
         """Return y(dt), shape (padded m,), or None where the Krylov space would have to be large."""
@@ -181,7 +161,7 @@ class VectorRows:
 
 @dataclass(frozen=True)
 class VectorEquations:
-    """The critic's equations of compiled rows, as `critic.NormalEquations`.
+    """The critic's equations of compiled rows, as `laws.NormalEquations`.
 
     Attributes
     ----------

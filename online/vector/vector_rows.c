@@ -20,7 +20,7 @@ typedef long long integer;
 
 const integer lanes = LANES;
 
-enum { PAPER, SQUARED, STATE_COST };
+enum { PAPER, STATE_COST };
 enum { MOST = 64 }; /* Lanczos vectors */
 
 typedef struct {
@@ -118,8 +118,7 @@ static vector row_weights(const table *t, integer b, const vector *omega, vector
   vector size = zero + 1.0, weights = t->gains[b];
   if (t->normalizer == STATE_COST) return weights / ((state_cost + t->floor) * (state_cost + t->floor));
   for (integer l = 0; l < t->m; ++l) size += omega[l] * omega[l];
-  if (t->normalizer == PAPER)
-    for (int lane = 0; lane < LANES; ++lane) size[lane] = sqrt(size[lane]);
+  for (int lane = 0; lane < LANES; ++lane) size[lane] = sqrt(size[lane]);
   return weights / size;
 }
 

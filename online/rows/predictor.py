@@ -1,0 +1,34 @@
+"""What policies are predicted to cost from a state, by the model, over a horizon."""
+
+from __future__ import annotations
+
+from ...symbolic import ValueFunctions, growing_steps
+from ...symbolic.arrays import Array
+from .paths import PathRows, RelativeTo
+
+
+class Predictor:
+    """Predicted costs, and rows along predicted paths.
+
+    Parameters
+    ----------
+    functions : of problem and basis
+    horizon : of the paths [s]; after it the cost is ζ'P ζ
+    n_steps : of the integration over the horizon, growing
+    """
+
+    def __init__(self, functions: ValueFunctions, horizon: float, n_steps: int) -> None:
+        self._prediction = functions.prediction(n_steps)
+        self._steps = growing_steps(horizon, n_steps)
+
+    def cost(self, zeta: Array, actor_1: Array, actor_2: Array) -> float:
+        """Return J from ζ (n,) of the policies (14)(15), infinite if they lose the vehicle."""
+        return self._prediction.path(zeta, actor_1, actor_2, self._steps).cost
+
+    def linear_cost(self, zeta: Array) -> float:
+        """Return J from ζ (n,) of the linear H-infinity policy, likewise."""
+        return self._prediction.linear_path(zeta, self._steps).cost
+
+    def path_rows(self, points: int, relative_to: RelativeTo = "rest") -> PathRows:
+        """Return the rows of the costate error along its paths, at so many points of each."""
+        return PathRows(self._prediction, self._steps, points, relative_to)
