@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stationkeep.comparison.evidence.adversary import FrozenPolicy, PlayedForce, WatchedController, play
 from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.offline import ControlPolicy, WorstCaseSolver, linear_policy
+from studies.adversary import FrozenPolicy, PlayedForce, WatchedController, play
 
 from .games import quick_scenario
 

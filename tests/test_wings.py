@@ -29,7 +29,7 @@ WINGS = {
     ),
     "comparison": (
         *("scenario", "policies", "parallel", "merit", "records", "optima"),
-        *("theory", "study", "sweep", "report", "adapters", "evidence"),
+        *("theory", "study", "sweep", "report", "adapters"),
     ),
     "cli": (
         *("interrupt", "options", "output", "states", "solving"),
