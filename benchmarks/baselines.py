@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import GameValue, RunMetrics, distribution, run_metrics
+from stationkeep.comparison.merit import GameValue, Regret, RunMetrics, run_metrics
 from stationkeep.comparison.policies import CONTENDERS
 from stationkeep.comparison.policies.mpc import ModelPredictive, PredictionSettings
 from stationkeep.comparison.records import online_record
@@ -71,13 +71,13 @@ def undisturbed(scenario: Scenario, n_states: int) -> list[dict[str, Any]]:
             found.append(run_metrics(record, station, optimum))
             lost += getattr(policy, "failures", 0)
             solves += getattr(policy, "solves", 0)
-        regret = distribution([metrics.regret for metrics in found])
-        row = {"policy": name, "regret": regret, "failed_solves": lost, "solves": solves}
+        regret = Regret.of(metrics.regret for metrics in found)
+        row = {"policy": name, "regret": regret.as_json(), "failed_solves": lost, "solves": solves}
         row |= {key: median(found, key) for key in FIGURES}
         rows.append(row)
-        shares = "".join(f"{100.0 * regret[key]:>{w}.3f}" for key, w in (("p90", 7), ("max", 7)))
         print(
-            f"{name:<24}{100.0 * regret['median']:>19.3f}{shares}{regret['diverged']:>8}"
+            f"{name:<24}{100.0 * regret.median:>19.3f}{100.0 * regret.p90:>7.3f}"
+            f"{100.0 * regret.max:>7.3f}{regret.diverged:>8}"
             f"{row['position_rms']:>9.3f}{row['excursion']:>9.3f}{row['effort']:>9.1f}"
             f"{row['energy']:>12.1f}{row['policy_microseconds']:>17.0f}{row['policy_mean']:>7.0f}"
             f"{f'{lost}/{solves}' if solves else '':>13}",

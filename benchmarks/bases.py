@@ -30,15 +30,16 @@ from pathlib import Path
 import numpy as np
 from regret import SEED
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.evidence.lesson import lesson
-from stationkeep.comparison.evidence.regret import Case, Summary, finished, game_cost
-from stationkeep.comparison.merit import GameValue
+from stationkeep.comparison.merit import FINE, GameValue, Regret, game_cost
+from stationkeep.comparison.merit import regret as regret_of
 from stationkeep.comparison.optima import fit, ideal_record
 from stationkeep.comparison.optima.ideal import Fit
 from stationkeep.comparison.policies import LinearPolicy, OnVehicle
 from stationkeep.offline import ErrorSize, OfflineSolver, Pairs
 from stationkeep.online import Controller, History, draw_samples, run, save
 from stationkeep.symbolic import RunError
+from studies.cases import Case, finished
+from studies.lesson import lesson
 
 Run = Callable[[Scenario], History]
 
@@ -57,7 +58,7 @@ class Reference:
         station = scenario.station_keeping()
         solver = OfflineSolver(station.problem, scenario.offline)
         self.states = draw_samples(station.envelope, n_states, SEED)
-        quick = GameValue(station)
+        quick = GameValue(station, FINE)
         found = [quick.solution(z) for z in self.states]
         self.values = np.array([solution.value for solution in found])
         kept = []
@@ -81,9 +82,9 @@ def regret(scenario: Scenario, reference: Reference, go: Run) -> str:
     P, found = scenario.station_keeping().problem.P, []
     for zeta, value in zip(reference.states, reference.values, strict=True):
         one = scenario.with_settings(simulation={"initial_state": zeta})
-        found.append(game_cost(finished(go(one)), P) / value - 1.0)
-    one_of = Summary.of(found)
-    return "/".join(f"{100.0 * value:6.3f}" for value in (one_of.median, one_of.p90, one_of.largest))
+        found.append(regret_of(game_cost(finished(go(one)), P), value))
+    one_of = Regret.of(found)
+    return "/".join(f"{100.0 * value:6.3f}" for value in (one_of.median, one_of.p90, one_of.max))
 
 
 def linear_run(scenario: Scenario) -> History:

@@ -28,22 +28,16 @@ import time
 from pathlib import Path
 
 import numpy as np
-from starts import print_starts, print_zero
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.evidence.kept import Keep
-from stationkeep.comparison.evidence.lesson import lesson
-from stationkeep.comparison.evidence.regret import (
-    MOONSHOT,
-    REQUIRED,
-    Case,
-    Row,
-    Summary,
-    regrets,
-    target,
-)
+from stationkeep.comparison.merit import Regret
 from stationkeep.comparison.parallel import default_workers
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import StationkeepError
+from studies.cases import Case, Row, regrets
+from studies.kept import Keep
+from studies.lesson import lesson
+from studies.targets import MOONSHOT, REQUIRED, target
+from studies.wrong_starts import print_starts, print_zero
 
 SEED = 20
 BETWEEN_NOTES = 10.0  # s
@@ -102,20 +96,20 @@ def print_table(options: argparse.Namespace) -> None:
         states = draw_samples(envelope, options.states, SEED)
         found = regrets(scenario, cases, states, keep(options, f"s = {scale:g}"))
         # a linear policy that lost the vehicle somewhere excuses nobody
-        linear = Summary.of(row.regret for row in found["linear"] if np.isfinite(row.regret))
+        linear = Regret.of(row.regret for row in found["linear"] if np.isfinite(row.regret))
         for name, rows in found.items():
             pairs = zip(rows, found["linear"], strict=True)
             worse = sum(row.regret > other.regret for row, other in pairs)
             print_row(scale, name, rows, linear, worse)
 
 
-def print_row(scale: float, name: str, rows: list[Row], linear: Summary, worse: int) -> None:
+def print_row(scale: float, name: str, rows: list[Row], linear: Regret, worse: int) -> None:
     """Print the figures of a policy at a scale, and the reasons of its failures on stderr."""
-    one = Summary.of(row.regret for row in rows)
-    figures = "".join(f"{100 * value:8.3f}" for value in (one.median, one.p90, one.largest))
-    line = f"{scale:5.2f} {name:<9}{figures}{one.failed:>8}"
+    one = Regret.of(row.regret for row in rows)
+    figures = "".join(f"{100 * value:8.3f}" for value in (one.median, one.p90, one.max))
+    line = f"{scale:5.2f} {name:<9}{figures}{one.diverged:>8}"
     if name != "linear":
-        line += f"{worse:>7}{one.median / linear.median:20.3f}{one.largest / linear.largest:7.3f}  "
+        line += f"{worse:>7}{one.median / linear.median:20.3f}{one.max / linear.max:7.3f}  "
         for limits in (target(REQUIRED, scale), target(MOONSHOT, scale)):
             line += f"{' / '.join('met' if m else 'missed' for m in limits.met(one, linear)):<18}"
     else:

@@ -22,8 +22,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from closed_loops import Row, Run, run_all
-from robustness_runs import (
+from stationkeep.comparison import Scenario
+from stationkeep.comparison.parallel import default_workers
+from stationkeep.symbolic.underwater import STATE_NAMES
+from studies.closed_loops import Row, Run, run_all
+from studies.robustness_runs import (
     corner_runs,
     current_runs,
     dissipation_runs,
@@ -31,9 +34,6 @@ from robustness_runs import (
     noise_runs,
     start_runs,
 )
-from stationkeep.comparison import Scenario
-from stationkeep.comparison.parallel import default_workers
-from stationkeep.symbolic.underwater import STATE_NAMES
 
 Table = Callable[[list[Row]], None]
 

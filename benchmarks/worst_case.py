@@ -29,10 +29,11 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.evidence.worst_cases import StateWorstCases, WorstCases
+from stationkeep.comparison.merit import Regret
 from stationkeep.comparison.parallel import Work, run_tasks
 from stationkeep.online import draw_samples, run
 from stationkeep.online.records import write_text
+from studies.worst_cases import StateWorstCases, WorstCases
 
 SEED = 20
 FROZEN = ("linear", "lqr", "settled", "remembered", "schedule")
@@ -100,9 +101,8 @@ def summary(rows: list[StateWorstCases]) -> None:
     columns["learner"] = [row.learner for row in rows]
     for name, column in columns.items():
         values = np.array(column)
-        figures = " / ".join(
-            _percent(value) for value in np.quantile(values, [0.5, 0.9, 1.0], method="higher")
-        )
+        one = Regret.of(column)
+        figures = " / ".join(map(_percent, (one.median, one.p90, one.max)))
         print(
             f"{name:<11} median / 90 % / maximum {figures} %   smaller than linear from "
             f"{int(np.sum(values < linear))} of {len(rows)}"

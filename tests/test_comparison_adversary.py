@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stationkeep.comparison.evidence.adversary import FrozenPolicy, PlayedForce, WatchedController, play
 from stationkeep.offline import ControlPolicy, WorstCaseSolver, linear_policy
+from studies.adversary import FrozenPolicy, PlayedForce, WatchedController, play
 
 from .games import linear_on, quick_scenario
 

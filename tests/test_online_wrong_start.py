@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 import scipy.linalg
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.evidence.kept import Keep
-from stationkeep.comparison.evidence.lesson import lesson
-from stationkeep.comparison.evidence.regret import Case, Optimum
-from stationkeep.comparison.evidence.starts import (
+from stationkeep.comparison.merit import GameValue
+from stationkeep.online import Controller, Learner, LearnerSettings, draw_samples
+from stationkeep.symbolic import InputError, Model, Vehicle
+from studies.cases import Case
+from studies.kept import Keep
+from studies.lesson import lesson
+from studies.recovery import (
     Recovery,
     half_added_mass,
     rank_and_margin,
@@ -21,8 +24,6 @@ from stationkeep.comparison.evidence.starts import (
     remembered_regret,
     time_within,
 )
-from stationkeep.online import Controller, Learner, LearnerSettings, draw_samples
-from stationkeep.symbolic import InputError, Model, Vehicle
 
 from .games import (
     HALF_WIDTHS,
@@ -243,7 +244,7 @@ def test_a_lesson_is_a_run_and_what_it_remembered(tmp_path: Path) -> None:
     assert taught.path.stat().st_mtime_ns == written
     np.testing.assert_array_equal(again.weights, taught.weights)
     states = draw_samples(station.envelope, 3, 8)
-    optimum = Optimum(station.problem)
+    optimum = GameValue(station)
     medians = remembered_regret(scenario, taught, states, np.array([optimum(z) for z in states]))
     assert medians[-1] < medians[0]
     assert np.all(medians > 0.0)

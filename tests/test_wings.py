@@ -32,7 +32,7 @@ WINGS = {
     ),
     "comparison": (
         *("scenario", "policies", "parallel", "merit", "records", "optima"),
-        *("theory", "study", "sweep", "report", "compare", "adapters", "evidence"),
+        *("theory", "study", "sweep", "report", "compare", "adapters"),
     ),
     "cli": (
         *("interrupt", "options", "output", "states", "solving"),

@@ -13,18 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from stationkeep.comparison.merit import FINE, GameValue, Regret, regret
+from stationkeep.comparison.parallel import Work
+from stationkeep.comparison.records import provenance
+from stationkeep.comparison.scenario import Scenario
+from stationkeep.online import Controller, run
+from stationkeep.online.paper import BellmanTerms, bellman_error
+from stationkeep.online.records import write_text
+from stationkeep.symbolic import Basis, Problem, ValueFunctions, Vehicle
+from stationkeep.symbolic.arrays import Array
 
-from ...online import Controller, run
-from ...online.paper import BellmanTerms, bellman_error
-from ...online.records import write_text
-from ...symbolic import Basis, Problem, ValueFunctions, Vehicle
-from ...symbolic.arrays import Array
-from ..parallel import Work
-from ..records import provenance
-from ..scenario import Scenario
+from .cases import Case, finished
 from .kept import Keep, Result, key_of
 from .lesson import Lesson
-from .regret import Case, Optimum, finished
 
 WATCHED = 10.0  # s, until when the policy in use is followed
 WITHIN = 1.1  # times the regret of the right start
@@ -57,7 +58,7 @@ def remembered_regret(scenario: Scenario, lesson: Lesson, states: Array, optima:
     for weights in lesson.weights:
         if before is None or not np.array_equal(weights, before):
             costs = np.array([predicted(zeta, weights, weights) for zeta in states])
-            known = float(np.quantile(costs / optima - 1.0, 0.5, method="higher"))
+            known = Regret.of(map(regret, costs, optima)).median
         before = weights
         medians.append(known)
     return np.array(medians)
@@ -147,7 +148,7 @@ class _Beside:
 
 def _worker(shipment: tuple[Scenario, Case]) -> Work[Array, Result]:
     scenario, case = shipment
-    optimum = Optimum(scenario.station_keeping().problem)
+    optimum = GameValue(scenario.station_keeping(), FINE)
     wrong = case.scenario(scenario)
 
     def work(zeta: Array) -> Iterator[Result]:

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from stationkeep.comparison.merit import game_cost
+from stationkeep.comparison.records import provenance
+from stationkeep.comparison.scenario import Scenario
+from stationkeep.online import Controller, load, run, save, to_dataset
+from stationkeep.symbolic import InputError
+from stationkeep.symbolic.arrays import Array
 
-from ...online import Controller, load, run, save, to_dataset
-from ...symbolic import InputError
-from ...symbolic.arrays import Array
-from ..records import provenance
-from ..scenario import Scenario
+from .cases import Case, finished
 from .kept import key_of
-from .regret import Case, finished
 
 
 @dataclass(frozen=True)
@@ -25,8 +26,7 @@ class Lesson:
     path : of the run's record, for `learner.weights`
     times : (T,) [s], every second and the end
     weights : (T, m) remembered at these times
-    cost : of the run in the game up to its end, without what is left [cost]
-    end : (12,) state there
+    cost : of the run in the game; infinite if it ended early
     stopped : why it ended early, or None
     """
 
@@ -34,7 +34,6 @@ class Lesson:
     times: Array
     weights: Array
     cost: float
-    end: Array
     stopped: str | None
 
 
@@ -51,11 +50,12 @@ def lesson(scenario: Scenario, case: Case, zeta: Array, folder: Path) -> Lesson:
     )
     attributes = provenance(taught, "lesson")
     path = folder / f"lesson-{key_of(attributes['key'])[:16]}.nc"
+    P = scenario.station_keeping().problem.P
     try:
-        return _read(path)
+        return _read(path, P)
     except InputError:
         _teach(taught, path, attributes)
-        return _read(path)
+        return _read(path, P)
 
 
 def _teach(taught: Scenario, path: Path, attributes: dict[str, object]) -> None:
@@ -75,13 +75,12 @@ def _teach(taught: Scenario, path: Path, attributes: dict[str, object]) -> None:
     save(record.assign_coords(note_time=("note_time", np.array(times), {"units": "s"})), path)
 
 
-def _read(path: Path) -> Lesson:
+def _read(path: Path, P: Array) -> Lesson:
     record = load(path)
     return Lesson(
         path=path,
         times=record["note_time"].values,
         weights=record["noted"].values,
-        cost=float(record["cost"].values[-1] - record["attenuated"].values[-1]),
-        end=record["zeta"].values[-1],
+        cost=game_cost(record, P),
         stopped=str(record.attrs["stopped"]) or None,
     )

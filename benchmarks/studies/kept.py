@@ -12,12 +12,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ...symbolic import InputError
-from ..parallel import S, T, Work, run_tasks
+from stationkeep.comparison.parallel import S, T, Work, run_tasks
+from stationkeep.symbolic import InputError
 
 Result = dict[str, Any]
 Progress = Callable[[int, int, int], None]
 _PACKAGES = ("symbolic", "online", "offline", "comparison")
+_SOURCES = (".py", ".c", ".toml")
 
 
 @dataclass(frozen=True)
@@ -102,10 +103,27 @@ def key_of(*parts: object) -> str:
 
 @cache
 def sources() -> str:
-    """Return the hash of the sources of all that runs."""
-    digest = hashlib.sha256()
-    for package in _PACKAGES:
-        folder = resources.files(f"stationkeep.{package}")
-        for path in sorted(Path(str(folder)).rglob("*.py")):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
+    """Return the hash of the sources of all that runs: of the package, and of this folder."""
+    return digest(source_folders())
+
+
+def source_folders() -> list[Path]:
+    """Return the folders whose files decide what a result is.
+
+    The command line is none of them, nor are the scripts: what they ask for is in the other parts of a
+    key.
+    """
+    found = [Path(str(resources.files(f"stationkeep.{package}"))) for package in _PACKAGES]
+    return [*found, Path(__file__).resolve().parent]
+
+
+def digest(folders: Sequence[Path]) -> str:
+    """Return the hash of names and contents of the source files in the folders and all below them."""
+    found = hashlib.sha256()
+    for folder in folders:
+        files = sorted(path for path in folder.rglob("*") if path.suffix in _SOURCES)
+        for path in files:
+            content = path.read_bytes()
+            head = f"{folder.name} {path.relative_to(folder).as_posix()} {len(content)}\0"
+            found.update(head.encode() + content)
+    return found.hexdigest()

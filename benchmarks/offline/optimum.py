@@ -1,6 +1,6 @@
 """Evidence for the offline optimum: certificates, agreement, several extremals, and its speed.
 
-    python benchmarks/optimum.py [--states 50] [--only exact certificates saddle speed]
+    python benchmarks/offline/optimum.py [--states 50] [--only exact certificates saddle speed]
 
 Prints for each part what is measured; a failed certificate is a row with its reason, not dropped.
 Seeds are fixed. Speeds are medians in one process with one thread.

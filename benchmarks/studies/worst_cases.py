@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from casadi import DM
-
-from ...offline import (
+from stationkeep.comparison.merit import GameValue, regret
+from stationkeep.comparison.policies import LQR, LinearPolicy, OnVehicle
+from stationkeep.comparison.scenario import Scenario
+from stationkeep.offline import (
     ControlPolicy,
     ScheduledWorstCase,
     Trajectory,
@@ -18,12 +20,10 @@ from ...offline import (
     learned_policy,
     linear_policy,
 )
-from ...offline.responses import unbounded
-from ...online import VehiclePolicy
-from ...symbolic.arrays import Array
-from ..merit import GameValue
-from ..policies import LQR, LinearPolicy, OnVehicle
-from ..scenario import Scenario
+from stationkeep.offline.responses import unbounded
+from stationkeep.online import VehiclePolicy
+from stationkeep.symbolic.arrays import Array
+
 from .adversary import FrozenPolicy, Played, WatchedController, play, settled_weights
 
 ROUNDS = 2  # of the search against the learner; the cost that is played has settled to 1e-5 of V* then
@@ -137,7 +137,7 @@ class WorstCases:
         for name, path in self._others(solved, last):
             against[name] = play(scenario, WatchedController(scenario), path)
         policies["schedule"] = _exposure(last, value, played)
-        relative = {name: _relative(run.cost, value) for name, run in against.items()}
+        relative = {name: regret(run.cost, value) for name, run in against.items()}
         return StateWorstCases(zeta, value, policies, relative)
 
     def _of_frozen(self, zeta: Array, weights: Array) -> WorstCase:
@@ -179,12 +179,8 @@ def _exposure(worst: WorstCase, value: float, played: Played | None) -> Exposure
     cost = None if played is None or worst.path is None else played.cost
     return Exposure(
         excess=worst.excess(value),
-        played=_relative(cost, value),
+        played=regret(cost, value),
         strict=worst.second_order is not None and worst.second_order.holds,
         reintegration=abs(worst.reintegrated / worst.cost - 1.0) if worst.path is not None else np.inf,
         note=worst.unbounded if played is None or played.stopped is None else played.stopped,
     )
-
-
-def _relative(cost: float | None, value: float) -> float | None:
-    return None if cost is None else (cost - value) / value

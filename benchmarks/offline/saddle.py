@@ -1,6 +1,6 @@
 """The saddle point beside the direct solution, gamma* by two routes, and the value against gamma.
 
-    python benchmarks/saddle.py
+    python benchmarks/offline/saddle.py
 
 States are random in the whole envelope of the default scenario. Both solves align their mesh with the
 velocity sign changes of their own trajectory.

@@ -1,4 +1,4 @@
-"""What becomes of wrong starts: the second table of `regret.py`, see there."""
+"""What becomes of wrong starts: the second table of the script `regret.py`, see there."""
 
 from __future__ import annotations
 
@@ -8,10 +8,16 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.evidence.kept import Keep
-from stationkeep.comparison.evidence.lesson import Lesson, lesson
-from stationkeep.comparison.evidence.regret import Case, Optimum, Row, Summary, regrets
-from stationkeep.comparison.evidence.starts import (
+from stationkeep.comparison.merit import FINE, GameValue, Regret, regret
+from stationkeep.comparison.study.excitation import PLAIN, excitation_run
+from stationkeep.online import draw_samples, run
+from stationkeep.symbolic import Basis, Problem, ValueFunctions, quadratic
+from stationkeep.symbolic.arrays import Array
+
+from .cases import Case, Row, regrets
+from .kept import Keep
+from .lesson import Lesson, lesson
+from .recovery import (
     WATCHED,
     WITHIN,
     half_added_mass,
@@ -21,10 +27,6 @@ from stationkeep.comparison.evidence.starts import (
     remembered_regret,
     time_within,
 )
-from stationkeep.comparison.study.excitation import PLAIN, excitation_run
-from stationkeep.online import draw_samples, run
-from stationkeep.symbolic import Basis, Problem, ValueFunctions, quadratic
-from stationkeep.symbolic.arrays import Array
 
 Keeper = Callable[[str], Keep]
 TIMES = (0.0, 1.0, 5.0, 20.0, 60.0)  # s
@@ -61,7 +63,7 @@ def print_starts(scenario: Scenario, states: Array, start: Array, folder: Path, 
     words = {name: name for name in names} | {"tf": "t frozen", "to": "t online"}
     scale, n = scenario.envelope.scale, len(states)
     print(HEADER.format(n=n, scale=scale, within=WITHIN, watched=WATCHED, **words), flush=True)
-    optimum = Optimum(scenario.station_keeping().problem)
+    optimum = GameValue(scenario.station_keeping(), FINE)
     optima = np.array([optimum(zeta) for zeta in states])
     limit = np.inf
     for name, settings in wrong_starts(scenario, folder).items():
@@ -76,9 +78,10 @@ def print_starts(scenario: Scenario, states: Array, start: Array, folder: Path, 
             shown = {case: shares(rows) for case, rows in found.items()}
             failed = sum(not np.isfinite(row.regret) for rows in found.values() for row in rows)
             seconds = [one.seconds for one in followed]
+            before = Regret.of(one.before for one in followed).median
             print(
-                f"{name:<20}{reference:<11}{100 * np.median([one.before for one in followed]):8.2f}"
-                f"{shown['online']:>23}{100 * lesson_regret(scenario, taught, optimum(start)):8.3f}"
+                f"{name:<20}{reference:<11}{100 * before:8.2f}"
+                f"{shown['online']:>23}{100 * (regret(taught.cost, optimum(start)) or 0.0):8.3f}"
                 f"{shown['frozen']:>23}{shown['again']:>23}{failed:>8}"
                 f"{time_within(taught.times, predicted, limit):10.0f}"
                 f"{np.median(seconds):6.2f} /{np.max(seconds):5.2f}",
@@ -94,15 +97,8 @@ def fresh(taught: Lesson, reference: str) -> list[Case]:
 
 def shares(rows: list[Row]) -> str:
     """Return median, 90 % quantile and maximum of the regret in percent."""
-    one = Summary.of(row.regret for row in rows)
-    return " / ".join(f"{100 * value:.3f}" for value in (one.median, one.p90, one.largest))
-
-
-def lesson_regret(scenario: Scenario, taught: Lesson, value: float) -> float:
-    """Return the regret of the learning run itself."""
-    P = scenario.station_keeping().problem.P
-    cost = np.inf if taught.stopped else taught.cost + taught.end @ P @ taught.end
-    return float(cost / value - 1.0)
+    one = Regret.of(row.regret for row in rows)
+    return " / ".join(f"{100 * value:.3f}" for value in (one.median, one.p90, one.max))
 
 
 def zero_cases() -> dict[str, Case]:

@@ -1,6 +1,6 @@
 """Time of a step: model functions, policy, learner and closed loop, beside numpy, bounds and MPC.
 
-    python benchmarks/steps.py
+    python benchmarks/speed/steps.py
 
 Processor time, medians over repeated batches in one process; compare the ratios, not the absolute times
 of a machine. The numpy beside the learner is the straightforward one: einsum of dense σ' f and σ' g, an

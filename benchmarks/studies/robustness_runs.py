@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from closed_loops import Run
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.merit import GameValue
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import Vehicle
+
+from .closed_loops import Run
 
 Array = np.ndarray
 REST = np.zeros(12)

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.evidence.kept import Keep, key_of
 from stationkeep.comparison.merit import GameValue, dissipation_margin, run_metrics
 from stationkeep.comparison.parallel import Work
 from stationkeep.comparison.records import contender_record, provenance
 from stationkeep.symbolic import RunError
+
+from .kept import Keep, key_of
 
 Row = dict[str, Any]
 

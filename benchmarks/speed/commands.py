@@ -1,6 +1,6 @@
 """Wall time and memory of the commands a user types, as whole processes.
 
-    python benchmarks/commands.py [--runs 3]
+    python benchmarks/speed/commands.py [--runs 3]
 
 Targets: `--help` under 1 s, `generate` cold under 15 s and warm under 2 s, `compare` on the default
 scenario under 120 s on 2 cores, memory under 1 GB. Prints the median of the runs; a cold run starts

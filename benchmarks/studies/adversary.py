@@ -14,13 +14,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from ...offline import Trajectory, WeightSchedule
-from ...online import Controller, Feedback, History, VehiclePolicy, run
-from ...online.vehicle import Disturbance
-from ...symbolic import StationKeeping
-from ...symbolic.arrays import Array
-from ..scenario import Scenario
+from stationkeep.comparison.merit import finite, game_cost
+from stationkeep.comparison.scenario import Scenario
+from stationkeep.offline import Trajectory, WeightSchedule
+from stationkeep.online import Controller, Feedback, History, VehiclePolicy, run
+from stationkeep.online.vehicle import Disturbance
+from stationkeep.symbolic import StationKeeping
+from stationkeep.symbolic.arrays import Array
 
 
 class PlayedForce:
@@ -125,8 +125,5 @@ def settled_weights(scenario: Scenario, zeta: Array, steps: int = 40) -> Array:
 
 def _outcome(scenario: Scenario, policy: VehiclePolicy, history: History) -> Played:
     schedule = policy.schedule if isinstance(policy, WatchedController) else None
-    if history.stopped:
-        return Played(None, history.stopped, schedule)
-    end, P = history.zeta[-1], scenario.station_keeping().problem.P
-    cost = history.cost[-1] - history.attenuated[-1] + float(end @ P @ end)
-    return Played(cost, None, schedule)
+    cost = game_cost(history, scenario.station_keeping().problem.P)
+    return Played(finite(cost), history.stopped or None, schedule)

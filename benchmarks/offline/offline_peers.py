@@ -1,6 +1,6 @@
 """Time and error of the offline optimum, solved again from a new state: ours beside other tools.
 
-    python benchmarks/offline_peers.py [--venvs DIR] [--yapss-python PATH] [--json FILE]
+    python benchmarks/offline/offline_peers.py [--venvs DIR] [--yapss-python PATH] [--json FILE]
 
 Every contender solves the single-player equivalent of the reference game on the BlueROV2 Heavy, with
 the terminal cost ζ'P ζ, from (2, -1, 1, .3, -.2, 1, 0, ...) and six random states of the full envelope
@@ -63,7 +63,7 @@ CONTENDERS = (
     Contender("yapss", "yapss:build", STANDARD, "yapss", ("yapss", "casadi")),
     Contender("maptor", "maptor:build", STANDARD, "peers", ("maptor", "casadi")),
 )
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 # what pip is told in each environment, one command a line: a peer that fails leaves the others be
 VENVS = {
     "peers": (("-e", str(ROOT)), ("rockit-meco",), ("maptor",)),

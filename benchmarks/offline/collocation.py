@@ -1,6 +1,6 @@
 """Error of the collocated value against mesh size: order on smooth games, and what drag's kinks do.
 
-    python benchmarks/collocation.py
+    python benchmarks/offline/collocation.py
 
 The two-state game and the linear-quadratic game have closed-form values, exact for any horizon as the
 terminal cost is the value itself. The reference game starts from (2, -1, 1, .3, -.2, 1, 0, ...), where

@@ -1,6 +1,6 @@
 """Runs per second of `stationkeep sweep`, its parallel efficiency, its table and its end after kills.
 
-    python benchmarks/sweep.py [speed] [table] [killed] [--runs N] [--duration T] [--seed N]
+    python benchmarks/speed/sweep.py [speed] [table] [killed] [--runs N] [--duration T] [--seed N]
 
 speed: N runs (learned and linear, default 200 of 20 s) by 1 and 2 processes and 2 workers of a dask
 cluster on this machine; the efficiency of w workers is T_1 / (w T_w), whole commands, and, where other

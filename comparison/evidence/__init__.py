@@ -1,3 +1,0 @@
-"""Regret and worst cases for benchmarks."""
-
-__all__ = []
