@@ -1,5 +1,6 @@
 """Meshes, collocation points, and trajectories on them."""
 
+from .domain import Domain
 from .gauss import GaussRule
 from .grid import Bent, Grid, Pass, adjoint, backward
 from .interpolation import interpolate
@@ -14,6 +15,7 @@ from .verification import reintegrate, sign_changes
 __all__ = [
     "CLAIRVOYANT",
     "Bent",
+    "Domain",
     "GaussRule",
     "Grid",
     "GrowingMesh",

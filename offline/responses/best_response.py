@@ -43,7 +43,7 @@ class SaddleGap:
     lower : the least that the control pays against the disturbance's feedback
     disturbance, control : second-order verdicts of the two responses
     upper_starts, lower_starts : (s,) cost reached from the saddle point and from each perturbed start,
-        NaN where IPOPT did not converge
+        NaN where IPOPT did not converge inside the domain
     iterations : of IPOPT, all together
     seconds : wall time
     """

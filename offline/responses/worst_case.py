@@ -47,7 +47,7 @@ class WorstCase:
     second_order : whether it is a strict local maximum; None where unbounded
     reintegrated : the cost when scipy integrates the closed loop under that disturbance
     reach : largest excursion of a state, in half-widths
-    starts : (s,) cost reached from each start, NaN where IPOPT did not converge
+    starts : (s,) cost reached from each start, NaN where IPOPT did not converge inside the domain
     output_energy, disturbance_energy : ∫ |z|^2 dt, the rest included, and ∫ d'W_d d dt
     iterations : of IPOPT, all together
     seconds : wall time
@@ -119,7 +119,7 @@ class WorstCaseSolver:
         Raises
         ------
         InputError
-            If the state is not finite, of the wrong shape or pitched by 90 degrees.
+            If the state is not n finite numbers inside the domain.
         """
         started = time.perf_counter()
         zeta0 = self.problem.require_state(zeta0)

@@ -112,7 +112,7 @@ class GammaCurveSolver:
         Raises
         ------
         InputError
-            If the state is not finite, of the wrong shape or pitched by 90 degrees.
+            If the state is not n finite numbers inside the domain.
         """
         zeta0 = self.problem.require_state(zeta0)
         undisturbed, start = self._point(self._undisturbed, zeta0, None)
