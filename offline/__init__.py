@@ -16,6 +16,8 @@ from .responses import (
     WorstCaseSolver,
     learned_policy,
     linear_policy,
+    saddle_gap,
+    worst_case,
 )
 from .saddle import (
     GammaCurve,
@@ -61,6 +63,8 @@ __all__ = [
     "horizon_of",
     "learned_policy",
     "linear_policy",
+    "saddle_gap",
     "solve",
     "value_against_gamma",
+    "worst_case",
 ]

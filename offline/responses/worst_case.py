@@ -25,12 +25,12 @@ from typing import Unpack
 import numpy as np
 from casadi import SX
 
-from ...symbolic import RunError
+from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import SecondOrder, against_control
 from ..path import MeshChanges, MeshSettings, Trajectory
 from .disturber import ByInterval, Disturber
-from .policy import ControlPolicy
+from .policy import ControlPolicy, linear_policy
 from .response import Response
 
 
@@ -177,6 +177,24 @@ class WorstCaseSolver:
         level = np.array([self._level])
         guesses = self._disturber.guesses(zeta0, mesh, lambda t: level)
         return self._disturber.maximise(zeta0, mesh, guesses, _constant(self._level))
+
+
+def worst_case(problem: Problem, zeta0: Array, u_control: SX | None = None) -> WorstCase:
+    """Return the worst case of a control policy from one state; `WorstCaseSolver` is for many states.
+
+    Parameters
+    ----------
+    problem : the game on its plant, γ finite
+    zeta0 : (n,) initial state
+    u_control : (k,) expression of the problem's ζ; None for the linear H-infinity policy
+
+    Raises
+    ------
+    InputError
+        If the policy is none, or the state is not n finite numbers inside the domain.
+    """
+    policy = linear_policy(problem) if u_control is None else u_control
+    return WorstCaseSolver(ControlPolicy(problem, policy)).solve(zeta0)
 
 
 def measured(
