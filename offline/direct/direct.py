@@ -147,10 +147,10 @@ class DirectSolver:
         tolerance: float = 1e-6,
         rounds: int = 6,
     ) -> tuple[DirectSolution, Array]:
-        """Return the optimum on a mesh with points where the velocities change sign, and their times.
+        """Return the optimum on a mesh with points at its sign changes, and their times.
 
-        Drag |ν|ν is only C^1 there, which limits collocation to low order. Solve, locate the sign
-        changes, put mesh points on them, and repeat until they move by less than `tolerance` [s].
+        They are those of the switching functions along its own trajectory. The mesh is settled on them
+        to `tolerance` [s] in as many `rounds` at most; see `settle`.
         Arguments and errors otherwise as of `solve`.
         """
 

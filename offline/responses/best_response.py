@@ -102,10 +102,12 @@ class BestResponse:
 
         Raises
         ------
+        InputError
+            If the state is not n finite numbers inside the domain.
         RunError
             If a response does not converge from any start, or the path has a conjugate point.
         """
-        started = time.perf_counter()
+        started, zeta0 = time.perf_counter(), self.problem.require_state(zeta0)
         first, second = self._players(path.degree)
         mesh = self._mesh(value, path)
         times = first.times(mesh)

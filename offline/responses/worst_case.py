@@ -11,9 +11,9 @@ of the linearised closed loop. Where that has no solution the linearised closed 
 there are small disturbances that bring it from rest back to rest at a profit, and repeating them costs
 any amount. Otherwise the maximiser may still run off in the nonlinear plant, and this is looked for.
 
-The local maximum that is reported is the best of several starts. Mesh points are put where velocities
-change sign, scipy integrates the closed loop again under the disturbance that was found, and the
-second-order condition is checked.
+The local maximum that is reported is the best of several starts. Mesh points are put where switching
+functions change sign, scipy integrates the closed loop again under the disturbance that was found, and
+the second-order condition is checked.
 """
 
 from __future__ import annotations

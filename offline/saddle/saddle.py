@@ -157,10 +157,10 @@ class SaddleSolver:
         tolerance: float = 1e-6,
         rounds: int = 6,
     ) -> tuple[SaddleSolution, Array]:
-        """Return the saddle point on a mesh aligned with the velocity sign changes, and their times.
+        """Return the saddle point on a mesh with points at its sign changes, and their times.
 
-        The sign changes are those of its own trajectory: solve, locate them, put mesh points on them,
-        and repeat until they move by less than `tolerance` [s]. Raises as `solve`.
+        They are those of the switching functions along its own trajectory. The mesh is settled on them
+        to `tolerance` [s] in as many `rounds` at most; see `settle`. Raises as `solve`.
         """
         solutions, events = settle(
             self.plant,
