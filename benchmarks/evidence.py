@@ -14,7 +14,7 @@ import numpy as np
 from casadi import SX
 from stationkeep.comparison import Scenario
 from stationkeep.online import Learner, LearnerSettings, draw_samples
-from stationkeep.online.rows import BellmanTerms, bellman_error
+from stationkeep.online.paper import BellmanTerms, bellman_error
 from stationkeep.symbolic import (
     Basis,
     Model,

@@ -13,19 +13,19 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from stationkeep.comparison import Condition, Scenario, check
+from stationkeep.comparison import Condition, Scenario
 from stationkeep.comparison.merit import GameValue
 from stationkeep.comparison.optima import HELD_OUT, Bounds, Ideal, fit
 from stationkeep.comparison.policies import contender
 from stationkeep.comparison.records import contender_record
 from stationkeep.comparison.study.analysis import optimal_pairs
 from stationkeep.comparison.study.game_run import game_run
-from stationkeep.comparison.theory import run_conditions, theory
+from stationkeep.comparison.theory import run_conditions, scenario_conditions, theory
 from stationkeep.comparison.theory.exact_basis import exact_bound
 from stationkeep.comparison.theory.uub import Gains, Knowledge, constants, distance, lyapunov, measure
 from stationkeep.offline import Pairs
 from stationkeep.online import Learner, LearnerSettings, draw_samples, rank_margin
-from stationkeep.online.rows import BellmanTerms, bellman_error
+from stationkeep.online.paper import BellmanTerms, bellman_error
 from stationkeep.symbolic import Basis, ValueFunctions, quadratic, two_state_game
 
 POLICIES = ("learned", "quadratic", "gradient")
@@ -70,7 +70,7 @@ def conditions(scenario: Scenario, ideal: Ideal, policy: str, folder: Path) -> N
     changed = contender(policy).changed(scenario)
     record = contender_record(scenario, policy, folder / f"bluerov2-heavy-{policy}.nc")
     margin = float(record["rank_margin"].min())
-    rows = check(changed, ideal.bounds, margin)
+    rows = scenario_conditions(changed, ideal.bounds, margin)
     rows += run_conditions(changed, record, theory(changed, record, ideal))
     print(f"\nThe theorem and the run of '{contender(policy).label}'")
     for row in rows:

@@ -38,7 +38,7 @@ class Tell(Protocol):
 def load_scenario(options: argparse.Namespace) -> Scenario:
     """Return the scenario of the command line, its vehicle and game checked; raises InputError."""
     scenario = Scenario.load(options.scenario, options.overrides)
-    scenario.station_keeping()
+    scenario.setup()
     scenario.initial_weights()
     interrupt.check()
     return scenario

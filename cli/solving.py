@@ -43,4 +43,4 @@ class Rate:
             rate = solved / (time.monotonic() - self.started)
             left = timedelta(seconds=round((self.n - done) / rate))
             note += f", {rate:.2g}/s, {left} left"
-        self.tell(self.stage, done / self.n, note)
+        self.tell(self.stage, done / max(self.n, 1), note)

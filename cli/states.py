@@ -15,7 +15,7 @@ from ..symbolic.arrays import Array
 
 def initial_states(options: argparse.Namespace, scenario: Scenario) -> list[Array]:
     """Return the initial states of the command line, or the scenario's."""
-    problem = scenario.station_keeping().problem
+    problem = scenario.setup().problem
     states = [problem.require_state(_parse(text, problem)) for text in options.state or []]
     if options.states is not None:
         states += read_states(options.states, problem)

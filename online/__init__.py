@@ -1,18 +1,21 @@
 """Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
 
 from .learning import Learner, LearnerSettings, LearnerStep, Look, Monitor, SampleSettings
+from .loop import Feedback, FunctionPolicy, History, LearnedPolicy, Policy, RunSettings
+from .paper import rank_margin
 from .records import load, load_weights, save, to_dataset
-from .rows import draw_samples, rank_margin
+from .rows import draw_samples
+from .simulate import simulate
 from .vehicle import (
     Allocation,
     Allocator,
     Controller,
     DisturbanceObserver,
     DisturbanceSettings,
-    History,
     NoiseSettings,
-    Policy,
     SimulationSettings,
+    VehicleHistory,
+    VehiclePolicy,
     build_disturbance,
     run,
 )
@@ -23,7 +26,10 @@ __all__ = [
     "Controller",
     "DisturbanceObserver",
     "DisturbanceSettings",
+    "Feedback",
+    "FunctionPolicy",
     "History",
+    "LearnedPolicy",
     "Learner",
     "LearnerSettings",
     "LearnerStep",
@@ -31,8 +37,11 @@ __all__ = [
     "Monitor",
     "NoiseSettings",
     "Policy",
+    "RunSettings",
     "SampleSettings",
     "SimulationSettings",
+    "VehicleHistory",
+    "VehiclePolicy",
     "build_disturbance",
     "draw_samples",
     "load",
@@ -40,5 +49,6 @@ __all__ = [
     "rank_margin",
     "run",
     "save",
+    "simulate",
     "to_dataset",
 ]

@@ -107,7 +107,7 @@ def test_online_keeps_the_record_that_it_names(online: Answer, folder: Path) -> 
     np.testing.assert_array_equal(record["zeta"].values[-1], answer["final_state"])
     assert record["time"].values[-1] == pytest.approx(2.0)
     for variable in record.variables.values():
-        labels = (("state",), ("force",), ("player",))
+        labels = (("state",), ("input",), ("force",), ("player",))
         assert variable.dims in labels or variable.attrs["units"]
     assert {"scenario", "seed", "stationkeep_version", "casadi_version"} <= set(record.attrs)
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.optimize import differential_evolution, minimize
 from stationkeep.comparison import Condition, check
-from stationkeep.comparison.theory.conditions import drift_bound, inertia_bounds
+from stationkeep.comparison.theory.conditions import drift_bound
+from stationkeep.comparison.theory.vehicle_conditions import inertia_bounds
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import StationKeeping, Vehicle
 

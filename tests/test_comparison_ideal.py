@@ -21,6 +21,7 @@ from stationkeep.comparison.optima import (
     ideal_record,
     load_ideal,
 )
+from stationkeep.comparison.theory import scenario_conditions
 from stationkeep.comparison.theory.conditions import drift_bound
 from stationkeep.offline import Pairs
 from stationkeep.online import Learner, load, load_weights, save
@@ -216,7 +217,7 @@ def test_24_and_25_share_an_epsilon() -> None:
     limit = 2.0 * np.sqrt(q_lower * (margin - known) / gain) / L_f
     for factor, holds in ((0.5, True), (10.0, False)):
         bounds = Bounds(7.0, float(factor * limit), 9)
-        conditions = check(scenario, bounds)
+        conditions = scenario_conditions(scenario, bounds)
         first, second = found_in(conditions, "(24)"), found_in(conditions, "(25)")
         least = L_f * bounds.epsilon_prime / (2.0 * (margin - known))
         largest = 2.0 * q_lower / (gain * L_f * bounds.epsilon_prime)
@@ -229,7 +230,7 @@ def test_24_and_25_share_an_epsilon() -> None:
 
 
 def test_no_epsilon_helps_where_25_fails_without_it() -> None:
-    conditions = check(quick_scenario(), Bounds(1.0, 10.0, 5))
+    conditions = scenario_conditions(quick_scenario(), Bounds(1.0, 10.0, 5))
     first, second = found_in(conditions, "(24)"), found_in(conditions, "(25)")
     assert (first.bound, first.holds, second.holds) == (None, None, False)
     L_f = drift_bound(quick_scenario().station_keeping(), 500)

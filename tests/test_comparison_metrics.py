@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from casadi import collocation_points
-from scipy.integrate import quad, trapezoid
+from scipy.integrate import quad, solve_ivp, trapezoid
 from stationkeep.comparison.merit import (
+    FINE,
     GameValue,
+    Regret,
     cost_to_date,
     dissipation_margin,
-    distribution,
+    game_cost,
+    regret,
     run_metrics,
 )
 from stationkeep.comparison.merit.metrics import energy, peak_thrust
 from stationkeep.comparison.policies import LinearPolicy
 from stationkeep.comparison.records import online_record, optimal_record
 from stationkeep.offline import OfflineSolver, Trajectory
-from stationkeep.symbolic import Vehicle
+from stationkeep.online import run, to_dataset
+from stationkeep.symbolic import Setup, Vehicle
 
-from .games import Array, quick_scenario
+from .games import FAR_STATE, FAR_VALUE, FAST_STATE, FAST_VALUE, Array, quick_scenario, two_state
 
 FROM_REST = "simulation.initial_state=[0,0,0,0,0,0,0,0,0,0,0,0]"
 DISTURBED = ("simulation.mode=disturbed", "simulation.disturbance.kind=constant")
@@ -49,30 +52,129 @@ def learned() -> xr.Dataset:
 
 
 def test_distribution_of_finished_runs() -> None:
-    answer = distribution([0.4, 0.1, 0.3, 0.2, 0.5])
-    assert answer["median"] == pytest.approx(0.3)
-    assert answer["p90"] == pytest.approx(0.46)  # 0.4 + 0.6 (0.5 - 0.4), between the 4th and 5th
-    assert answer["max"] == pytest.approx(0.5)
-    assert answer["diverged"] == 0
+    """The quantile q is number ceil(q (n - 1)) from zero: of five the third, the fifth, the fifth."""
+    answer = Regret.of([0.4, 0.1, 0.3, 0.2, 0.5])
+    assert (answer.median, answer.p90, answer.max) == (0.3, 0.5, 0.5)
+    assert (answer.n, answer.diverged, answer.note) == (5, 0, None)
+    assert answer.as_json() == {"median": 0.3, "p90": 0.5, "max": 0.5, "diverged": 0, "n": 5}
+    eleven = Regret.of(0.1 * i for i in range(11))
+    assert (eleven.median, eleven.p90, eleven.max) == (0.5, 0.9, 1.0), "where q falls on a run"
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 10, 100])
+def test_a_quantile_is_a_run_and_not_too_small(n: int) -> None:
+    """At least the share q of the runs has no more regret, and no smaller run has so many below it
+    that it lies at q or beyond by linear interpolation.
+    """
+    regrets = np.random.default_rng(n).random(n)
+    answer = Regret.of(regrets)
+    for q, value in ((0.5, answer.median), (0.9, answer.p90), (1.0, answer.max)):
+        assert value in regrets
+        assert np.mean(regrets <= value) >= q
+        assert value >= np.quantile(regrets, q)
+        smaller = regrets[regrets < value]
+        assert not len(smaller) or smaller.max() <= np.quantile(regrets, q)
 
 
 @pytest.mark.parametrize(
     ("regrets", "median", "diverged"),
     [
-        ([0.1, None, 0.3], 0.2, 1),
-        ([None, None, 0.7], 0.7, 2),
+        ([0.1, None, 0.3], 0.3, 1),
+        ([None, None, 0.7], None, 2),
+        ([0.1, np.inf, 0.3, np.nan, 0.2], 0.3, 2),
         ([None, None], None, 2),
         ([], None, 0),
         ([0.0, 0.0], 0.0, 0),
     ],
 )
-def test_distribution_counts_the_runs_that_diverged(
+def test_runs_that_failed_count_as_infinite(
     regrets: list[float | None], median: float | None, diverged: int
 ) -> None:
-    answer: dict[str, Any] = distribution(regrets)
+    answer = Regret.of(regrets).as_json()
     assert answer["diverged"] == diverged
-    assert answer["median"] == (None if median is None else pytest.approx(median))
-    assert (answer["max"] is None) == (median is None)
+    assert answer["median"] == median
+    assert (answer["max"] is None) == (diverged > 0 or not regrets)
+    assert ("note" in answer) == (answer["max"] is None), "what is null has a note"
+    if diverged:
+        assert f"{diverged} of {len(regrets)} runs ended early" in answer["note"]
+
+
+def test_regret_of_one_run() -> None:
+    assert regret(2.5, 2.0) == 0.25
+    assert regret(np.inf, 2.0) == np.inf
+    assert regret(None, 2.0) is regret(2.0, None) is None
+    assert regret(0.0, 0.0) is None, "at the station nothing is to be gained"
+
+
+def test_game_cost_of_a_run_and_of_its_record() -> None:
+    """The integral of the local cost and ζ(T)'P ζ(T); a run that ended early costs infinitely much."""
+    scenario = quick_scenario("simulation.duration=0.4")
+    P = scenario.station_keeping().problem.P
+    history = run(scenario)
+    record = to_dataset(history, {"mode": "game"})
+    end = record["zeta"].values[-1]
+    expected = cost_to_date(record)[-1] + end @ P @ end
+    assert game_cost(history, P) == game_cost(record, P) == pytest.approx(expected, rel=1e-15)
+    history.stopped = "the state left chi"
+    assert game_cost(history, P) == game_cost(to_dataset(history, {}), P) == np.inf
+
+
+def test_a_problem_that_is_no_vehicle() -> None:
+    """The two-state game along its optimum, V* = x_1^2 / 2 + x_2^2: no regret, and no thrusters."""
+    start, gamma = np.array([0.8, -1.0]), 2.0
+
+    def flow(t: float, x: Array) -> list[float]:
+        c = np.cos(2.0 * x[0]) + 2.0
+        u_control, u_disturbance = -c * x[1], c * x[1] / gamma**2
+        k = 1.0 - gamma**-2
+        drift = -x[0] / 2.0 - x[1] / 2.0 * (1.0 - k * c**2)
+        spent = x[0] ** 2 + x[1] ** 2 + u_control**2
+        attenuated = gamma**2 * u_disturbance**2
+        return [x[1] - x[0], drift + c * (u_control + u_disturbance), spent, attenuated]
+
+    times = np.linspace(0.0, 2.0, 21)
+    x = solve_ivp(flow, (0.0, 2.0), [*start, 0.0, 0.0], t_eval=times, rtol=1e-10, atol=1e-12).y.T
+    record = xr.Dataset(
+        {
+            "zeta": (("time", "state"), x[:, :2]),
+            "cost": ("time", x[:, 2]),
+            "attenuated": ("time", x[:, 3]),
+        },
+        {"time": times},
+        {"stopped": "", "mode": "game"},
+    )
+    problem, basis, _ = two_state()
+    setup = Setup(problem=problem, basis=basis, envelope=np.ones(2), compiled=False)
+    value = start[0] ** 2 / 2.0 + start[1] ** 2
+    metrics = run_metrics(record, setup, value)
+    assert metrics.cost == pytest.approx(value, rel=1e-8)
+    assert metrics.regret == pytest.approx(0.0, abs=1e-8)
+    assert metrics.cost == game_cost(record, problem.P)
+    assert metrics.rest_share == pytest.approx((x[-1, 0] ** 2 / 2.0 + x[-1, 1] ** 2) / value, rel=1e-7)
+    for name in ("position_rms", "excursion", "effort", "energy", "saturated", "peak_thrust"):
+        assert getattr(metrics, name) is None, name
+    assert run_metrics(record, setup, value / 2.0).regret == pytest.approx(1.0)
+    assert GameValue(setup)(start) == pytest.approx(value, rel=1e-6)
+
+
+@pytest.mark.parametrize(("zeta", "value"), [(FAR_STATE, FAR_VALUE), (FAST_STATE, FAST_VALUE)])
+def test_error_of_the_value(zeta: Array, value: float) -> None:
+    """A fast state is the harder one: its velocities change sign nine times within the mesh."""
+    station = quick_scenario().station_keeping()
+    errors = [abs(GameValue(station, n)(zeta) / value - 1.0) for n in (16, FINE)]
+    assert errors[0] < 4e-6
+    assert errors[1] < 8e-7
+    assert errors[1] < errors[0]
+
+
+def test_the_last_value_is_remembered() -> None:
+    value = GameValue(quick_scenario().station_keeping())
+    zeta = quick_scenario().initial_state
+    found = value.solution(zeta)
+    assert value.solution(zeta.copy()) is found
+    other = value(0.5 * zeta)
+    assert other < found.value
+    assert value(zeta) == found.value, "from a fresh start, whatever came before"
 
 
 def test_the_optimum_has_no_regret_against_itself() -> None:
@@ -89,8 +191,8 @@ def test_the_optimum_is_the_cheapest() -> None:
     scenario = quick_scenario("simulation.duration=40")
     station = scenario.station_keeping()
     value = optimum().attrs["value"]
-    run = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
-    metrics = run_metrics(run, station, value)
+    record = online_record(scenario, policy=lambda: LinearPolicy(station), kind="linear")
+    metrics = run_metrics(record, station, value)
     assert metrics.stopped is None
     assert metrics.regret is not None
     assert 0.009 < metrics.regret < 0.011

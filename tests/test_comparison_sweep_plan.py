@@ -146,7 +146,7 @@ def test_the_plant_alone() -> None:
 def test_a_scenario_of_another_vehicle_is_another_station() -> None:
     one = SCENARIO.with_settings(vehicle_parameters={"mass": 15.0})
     assert one.station_keeping() is not SCENARIO.station_keeping()
-    assert one.station_text() != SCENARIO.station_text()
+    assert one.setup_text() != SCENARIO.setup_text()
     kept = SCENARIO.with_settings(learner={"leash": 0.1})
     assert kept.station_keeping() is SCENARIO.station_keeping()
     assert Scenario.load(overrides=["vehicle_parameters.mass=15"]).model_vehicle().mass == 15.0

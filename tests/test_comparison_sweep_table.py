@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from stationkeep.comparison.merit import distribution
+from stationkeep.comparison.merit import Regret
 from stationkeep.comparison.sweep import summary
 from stationkeep.comparison.sweep.sweep_table import BLOCK, Journal, write_csv, write_netcdf
 
@@ -189,11 +189,28 @@ def test_the_summary_is_the_distribution_of_each_group() -> None:
     for (gamma, policy), group in zip(names, groups, strict=True):
         mine = [row for row in table if (row["game.gamma"], row["policy"]) == (gamma, policy)]
         whole = [row for row in mine if not row["failed"]]
-        known = distribution([row["regret"] for row in whole])
-        assert group["regret"] == {name: known[name] for name in ("median", "p90", "max")}
+        known = Regret.of([None if row["failed"] else row["regret"] for row in mine])
+        assert group["regret"] == known.as_json()
         assert (group["n"], group["failed"], group["too_short"]) == (9, 9 - len(whole), 1)
         assert group["energy"] == np.median([row["energy"] for row in whole])
     for learned, linear in (groups[:2], groups[2:]):
-        ratio = learned["regret"]["max"] / linear["regret"]["max"]
-        assert learned["of_linear"]["max"] == pytest.approx(ratio)
+        ratio = learned["regret"]["median"] / linear["regret"]["median"]
+        assert learned["of_linear"]["median"] == pytest.approx(ratio)
+        assert learned["regret"]["max"] is learned["of_linear"]["max"] is None, "one of them failed"
         assert linear["of_linear"] == {"median": 1.0, "p90": 1.0, "max": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("optimum", "diverged", "words"),
+    [(2.0, 3, "3 of 3 runs ended early"), (None, 0, "no run with an optimum")],
+)
+def test_a_group_whose_runs_all_failed_has_no_finite_regret(
+    optimum: float | None, diverged: int, words: str
+) -> None:
+    """Without an optimum, as in `disturbed` mode or for a γ that admits none, nothing was compared."""
+    names = ("regret", "position_rms", "energy", "policy_mean", "rest_share")
+    row = dict.fromkeys(names) | {"policy": "pid", "failed": True, "optimum": optimum}
+    (group,) = summary([row] * 3, [])
+    assert [group["regret"][name] for name in ("median", "p90", "max")] == [None] * 3
+    assert (group["failed"], group["regret"]["diverged"]) == (3, diverged)
+    assert words in group["regret"]["note"]

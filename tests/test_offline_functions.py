@@ -13,9 +13,9 @@ from stationkeep.offline import (
     OfflineSolver,
     Pairs,
     fit_weights,
+    gamma_curve,
     saddle_gap,
     solve,
-    value_against_gamma,
     worst_case,
 )
 from stationkeep.symbolic import InputError
@@ -58,9 +58,9 @@ def test_worst_case_of_the_linear_policy_in_a_linear_game_is_its_value() -> None
     assert found.cost == pytest.approx(FAR_STATE @ problem.P @ FAR_STATE, rel=1e-5)
 
 
-def test_value_against_gamma_at_its_own_level_is_the_value() -> None:
+def test_gamma_curve_at_its_own_level_is_the_value() -> None:
     problem, _, _ = two_state()
-    curve = value_against_gamma(problem, ZETA, [float(problem.game.gamma)])
+    curve = gamma_curve(problem, ZETA, [float(problem.game.gamma)])
     assert curve.points[0].value == pytest.approx(value(ZETA), rel=1e-8)
 
 
@@ -93,7 +93,7 @@ def test_the_command_gives_the_curve_of_the_function(
     (row,) = answer.json()["states"]
     scenario = Scenario.load("bluerov2-heavy", settings)
     problem = scenario.station_keeping().problem
-    curve = value_against_gamma(problem, STATE, [2.0, 5.0], scenario.offline)
+    curve = gamma_curve(problem, STATE, [2.0, 5.0], scenario.offline)
     assert [point["value"] for point in row["gamma_curve"]] == [p.value for p in curve.points]
     assert [point["slope"] for point in row["gamma_curve"]] == [p.slope for p in curve.points]
     assert row["undisturbed_value"] == curve.undisturbed.value

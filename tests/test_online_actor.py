@@ -8,7 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.integrate import solve_ivp
-from stationkeep.online.laws import Projection, actor_step
+from stationkeep.online.laws import actor_step
+from stationkeep.online.paper import Projection
 
 from .games import Array
 

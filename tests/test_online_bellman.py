@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from stationkeep.online.rows import BellmanTerms, bellman_error
+from stationkeep.online.paper import BellmanTerms, bellman_error
 from stationkeep.symbolic import Basis, Game, Problem, ValueFunctions
 
 from .games import TWO_STATE_WEIGHTS, Array, linear_quadratic, quick_scenario, random_weights, two_state

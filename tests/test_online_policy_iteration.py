@@ -17,7 +17,8 @@ from stationkeep.online.learning.policy_iteration import (
     fitted,
     policy_iteration,
 )
-from stationkeep.online.rows import BellmanTerms, PathRows
+from stationkeep.online.paper import BellmanTerms
+from stationkeep.online.rows import PathRows
 from stationkeep.symbolic import Basis, Problem, RunError, ValueFunctions, growing_steps, quadratic
 
 from .games import HALF_WIDTHS, Array, linear_quadratic, two_state

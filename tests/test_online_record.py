@@ -36,6 +36,7 @@ def test_dimensions_and_units(dataset: xr.Dataset) -> None:
         "time": 31,
         "learn_time": 4,  # at once, at 0.26 s, at 0.52 s and the end
         "state": 12,
+        "input": 6,
         "force": 6,
         "basis": 78,
         "look_time": 2,  # at once and the end

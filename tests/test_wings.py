@@ -19,10 +19,10 @@ ROOT = Path(__file__).resolve().parents[1]
 # in each folder the wings from the ground up: one imports only those before it
 WINGS = {
     "symbolic": (
-        *("arrays", "errors", "toml", "integration", "compiled"),
+        *("arrays", "errors", "toml", "pyfile", "expressions", "integration", "compiled"),
         *("game", "value", "underwater", "textbook"),
     ),
-    "online": ("laws", "rows", "learning", "vehicle", "records"),
+    "online": ("paper", "laws", "rows", "learning", "loop", "vehicle", "records", "simulate"),
     "offline": (
         *("path", "settings", "direct", "saddle", "certificate", "solve"),
         *("responses", "ideal_weights"),

@@ -64,7 +64,9 @@ def _film(options: argparse.Namespace, comparison: Comparison, folder: Path, tel
 
 
 def _answer(comparison: Comparison, figures: dict[str, Path], report: Path) -> dict[str, Any]:
-    regret: dict[str, Any] = comparison.regret or dict.fromkeys(comparison.metrics)
+    regret: dict[str, Any] = dict.fromkeys(comparison.metrics)
+    if comparison.regret is not None:
+        regret |= {name: one.as_json() for name, one in comparison.regret.items()}
     answer: dict[str, Any] = {
         "regret": regret,
         "envelope_scale": comparison.scenario.envelope.scale,

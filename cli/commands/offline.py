@@ -13,8 +13,8 @@ import numpy as np
 from ...comparison.optima import CERTIFICATE, Optima
 from ...comparison.parallel import locked
 from ...offline import horizon_of
-from ...online.records import FORCE_NAMES, remove_temporaries, written_whole
-from ...symbolic.underwater import STATE_NAMES
+from ...online.records import remove_temporaries, written_whole
+from ...symbolic import Problem
 from ..gamma import Curves
 from ..ideal_weights import ideal_weights, numbers, show
 from ..output import load_scenario, output_folder, print_file, print_table, write_json_rows
@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
     scenario = load_scenario(options)
     states = np.array(initial_states(options, scenario))
     asked = numbers(options, scenario)
-    problem = scenario.station_keeping().problem
+    problem = scenario.setup().problem
     curves = Curves(options, problem, horizon_of(problem, scenario.offline))
     saddle = Saddle(options, problem)
     folder = output_folder(options)
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
         told = Told()
         rows = curves.each(optima.rows(given_up), len(states))
         rows = saddle.each(rows, folder, len(states))
-        rows = told.each(_into_csv(folder / "offline.csv", rows))
+        rows = told.each(_into_csv(folder / "offline.csv", problem, rows))
         write_json_rows(folder / "offline.json", "states", rows, rest)
         curves.draw(folder)
     if options.json:
@@ -135,10 +135,11 @@ def _verdict(row: dict[str, Any]) -> str:
     return f"yes; the lowest of {others + 1} extremals" if others else "yes"
 
 
-def _into_csv(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+def _into_csv(path: Path, problem: Problem, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """Yield the rows and write each to a table, its numbers exact; an unknown number is left empty."""
-    vectors: dict[str, tuple[str, ...]] = {"zeta": STATE_NAMES, "costate": STATE_NAMES}
-    vectors |= {"u_control": FORCE_NAMES, "u_disturbance": FORCE_NAMES}
+    states, inputs = problem.state_names, problem.input_names
+    vectors: dict[str, tuple[str, ...]] = {"zeta": states, "costate": states}
+    vectors |= {"u_control": inputs, "u_disturbance": inputs}
     numbers = ("value", *CERTIFICATE, "iterations", "seconds", "certified_seconds")
     heads = [f"{name}_{part}" for name, parts in vectors.items() for part in parts]
     with written_whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:

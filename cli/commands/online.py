@@ -10,14 +10,14 @@ import xarray as xr
 
 from ...comparison.merit import GameValue, dissipation_margin, run_metrics
 from ...comparison.records import online_record
-from ...symbolic import RunError, StationKeeping
+from ...symbolic import RunError, Setup
 from ..output import load_scenario, output_folder, print_json, print_table, progress
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the scenario's learner, write its record and print what came out."""
     scenario = load_scenario(options)
-    station = scenario.station_keeping()
+    station = scenario.setup()
     path = output_folder(options) / "learned.nc"
     duration = scenario.simulation.duration
     with progress(options) as tell:
@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if stopped is None else 1
 
 
-def _margin(record: xr.Dataset, station: StationKeeping) -> float | None:
+def _margin(record: xr.Dataset, station: Setup) -> float | None:
     """Return the dissipation margin of what was run, None if nothing was or there is no value."""
     zeta = record["zeta"].values
     if not len(zeta):

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...online import Controller, Policy
-from ...online.records import FORCE_NAMES
 from ...symbolic import InputError, Kernel, Model
 from ...symbolic.arrays import Array
-from ...symbolic.underwater import STATE_NAMES
+from ...symbolic.underwater import FORCE_NAMES, STATE_NAMES
 from ..policies import LinearPolicy
 from ..scenario import Scenario
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...online import build_disturbance
-from ...online.vehicle import HeldPlant, MeasurementNoise, PlantState
+from ...online.loop import PlantState
+from ...online.vehicle import HeldPlant, MeasurementNoise
 from ...symbolic import InputError, RunError
 from ...symbolic.arrays import Array
 from ..policies import LinearPolicy
@@ -82,7 +83,7 @@ class StationKeepingEnv(gymnasium.Env[Single, Single]):
         if actions == "thrusters" and thrusters is None:
             raise InputError("the vehicle has no thruster layout; choose actions='wrench'")
         self._thrusters = None if actions == "wrench" else thrusters
-        gain = np.abs(LinearPolicy(self.station).gain)
+        gain = np.abs(LinearPolicy(self.station.problem).gain)
         self.wrench_scale = gain @ self.station.envelope
         n_actions = 6 if self._thrusters is None else self._thrusters.matrix.shape[1]
         self._edge = 2.0 * self.settings.chi

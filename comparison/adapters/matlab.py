@@ -10,11 +10,33 @@ from typing import Any
 import xarray as xr
 from scipy.io import savemat
 
+from ...online import load
 from ...online.records import written_whole
+from ...symbolic import InputError
 
 LONGEST = 63  # characters of a MATLAB name
 # MATLAB's keywords that are not also Python's
 RESERVED = {"case", "catch", "end", "function", "otherwise", "parfor", "persistent", "spmd", "switch"}
+
+
+def export(record: Path | str, out: Path | str | None = None) -> tuple[Path, list[str]]:
+    """Write the record in a file as a .mat file; return its path and the names of its variables.
+
+    Parameters
+    ----------
+    record : netCDF file of a run or an optimum
+    out : path that ends with .mat; beside the record if None
+
+    Raises
+    ------
+    InputError
+        If the record can't be read, or the file can't be written or is not to end with .mat.
+    """
+    dataset = load(Path(record))
+    path = Path(record).with_suffix(".mat") if out is None else Path(out)
+    if path.suffix != ".mat":
+        raise InputError(f"--out is '{path}', but MATLAB loads files that end with .mat; name one so")
+    return path, export_mat(dataset, path)
 
 
 def export_mat(record: xr.Dataset, path: Path) -> list[str]:

@@ -16,11 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...offline import Trajectory, WeightSchedule
-from ...online import Controller, History, Policy, run
+from ...online import Controller, Feedback, History, VehiclePolicy, run
 from ...online.vehicle import Disturbance
 from ...symbolic import StationKeeping
 from ...symbolic.arrays import Array
-from ..policies import Baseline
 from ..scenario import Scenario
 
 
@@ -50,11 +49,12 @@ class PlayedForce:
         return Disturbance(force, np.zeros(3), np.zeros(3))
 
 
-class FrozenPolicy(Baseline):
+class FrozenPolicy(Feedback):
     """û_1 of (14) with weights (m,) that stay, and no safeguard."""
 
     def __init__(self, station: StationKeeping, weights: Array) -> None:
-        super().__init__(station)
+        super().__init__(station.problem)
+        self.station = station
         self.weights = weights
 
     def control(self, zeta: Array, dt: float) -> Array:
@@ -104,7 +104,7 @@ class Played:
     schedule: WeightSchedule | None = None
 
 
-def play(scenario: Scenario, policy: Policy, path: Trajectory | None) -> Played:
+def play(scenario: Scenario, policy: VehiclePolicy, path: Trajectory | None) -> Played:
     """Run a policy against the input of a path, or without one in the scenario's mode.
 
     The loop is the real one: wrenches held over the control period, a learner that learns on.
@@ -119,11 +119,11 @@ def settled_weights(scenario: Scenario, zeta: Array, steps: int = 40) -> Array:
     """Return the actor weights after so many learning steps while the vehicle waits at ζ, (m,)."""
     controller = Controller(scenario)
     for _ in range(steps):
-        controller.learner.step(zeta, controller.period)
+        controller.learner.step(zeta, controller.learned.period)
     return controller.learner.actor_1
 
 
-def _outcome(scenario: Scenario, policy: Policy, history: History) -> Played:
+def _outcome(scenario: Scenario, policy: VehiclePolicy, history: History) -> Played:
     schedule = policy.schedule if isinstance(policy, WatchedController) else None
     if history.stopped:
         return Played(None, history.stopped, schedule)

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from ...offline import DirectSolver
-from ...online import Controller, History, Policy, run
+from ...online import Controller, History
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..parallel import Work
-from ..policies import contender
-from ..records import provenance
+from ..policies import AnyPolicy, contender
+from ..records import closed_loop, provenance
 from ..scenario import Scenario
 from .kept import Keep, Result, key_of
 
@@ -50,7 +50,7 @@ class Case:
         changed = contender(self.policy).changed(scenario).with_settings(**self.changes)
         return changed.with_settings(simulation={"mode": "game"})
 
-    def make(self, scenario: Scenario) -> Policy:
+    def make(self, scenario: Scenario) -> AnyPolicy:
         """Return the policy of a scenario of its own."""
         return (
             contender(self.policy).make(scenario) if self.learn else Controller(scenario, learn=False)
@@ -187,7 +187,7 @@ def _worker(shipment: tuple[Scenario, tuple[Case, ...]]) -> Work[Task, Result]:
     def work(task: Task) -> Iterator[Result]:
         number, zeta = task
         one = scenarios[number].with_settings(simulation={"initial_state": tuple(zeta.tolist())})
-        history = finished(run(one, cases[number].make(one)))
+        history = finished(closed_loop(one, cases[number].make(one)))
         value, stopped = None, history.stopped
         try:
             value = optimum(zeta)

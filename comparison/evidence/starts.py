@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ...online import Controller, run
+from ...online.paper import BellmanTerms, bellman_error
 from ...online.records import write_text
-from ...online.rows import BellmanTerms, bellman_error
 from ...symbolic import Basis, Problem, ValueFunctions, Vehicle
 from ...symbolic.arrays import Array
 from ..parallel import Work

@@ -19,10 +19,10 @@ from ...offline import (
     linear_policy,
 )
 from ...offline.responses import unbounded
-from ...online import Policy
+from ...online import VehiclePolicy
 from ...symbolic.arrays import Array
 from ..merit import GameValue
-from ..policies import LQR, LinearPolicy
+from ..policies import LQR, LinearPolicy, OnVehicle
 from ..scenario import Scenario
 from .adversary import FrozenPolicy, Played, WatchedController, play, settled_weights
 
@@ -94,7 +94,7 @@ class WorstCases:
         self.remembered, self.probes, self.seed = remembered, probes, seed
         problem, basis, horizon = self.station.problem, self.station.basis, scenario.simulation.duration
         self._value = GameValue(self.station)
-        lqr = DM(-LQR(self.station).gain) @ problem.zeta
+        lqr = DM(-LQR(self.station.problem).gain) @ problem.zeta
         self._linear, self._lqr = (
             WorstCaseSolver(ControlPolicy(problem, policy), reach=REACH)
             for policy in (linear_policy(problem), lqr)
@@ -114,18 +114,18 @@ class WorstCases:
         """
         scenario = self.scenario.with_settings(simulation={"initial_state": tuple(zeta.tolist())})
         value = self._value(zeta)
-        settled = settled_weights(scenario, zeta)
+        settled, problem = settled_weights(scenario, zeta), self.station.problem
         solved = {
             "linear": self._linear.solve(zeta),
             "lqr": self._lqr.solve(zeta),
             "settled": self._of_frozen(zeta, settled),
             "remembered": self._of_frozen(zeta, self.remembered),
         }
-        makers: dict[str, Callable[[], Policy]] = {
-            "linear": lambda: LinearPolicy(self.station),
-            "lqr": lambda: LQR(self.station),
-            "settled": lambda: FrozenPolicy(self.station, settled),
-            "remembered": lambda: FrozenPolicy(self.station, self.remembered),
+        makers: dict[str, Callable[[], VehiclePolicy]] = {
+            "linear": lambda: OnVehicle(LinearPolicy(problem), self.station),
+            "lqr": lambda: OnVehicle(LQR(problem), self.station),
+            "settled": lambda: OnVehicle(FrozenPolicy(self.station, settled), self.station),
+            "remembered": lambda: OnVehicle(FrozenPolicy(self.station, self.remembered), self.station),
         }
         policies = {
             name: _exposure(

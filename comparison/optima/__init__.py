@@ -13,7 +13,7 @@ from .ideal import (
     load_ideal,
     require_numbers,
 )
-from .optima import CERTIFICATE, Optima, record_path
+from .optima import CERTIFICATE, Optima, record_path, unit_text
 
 __all__ = [
     "CERTIFICATE",
@@ -30,4 +30,5 @@ __all__ = [
     "load_ideal",
     "record_path",
     "require_numbers",
+    "unit_text",
 ]

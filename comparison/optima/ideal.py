@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...offline import ErrorSize, Pairs, error_sizes, fit_weights
+from ...offline import ErrorSize, Pairs, Plant, error_sizes, fit_weights
 from ...offline.ideal_weights import least_states, representation_errors
 from ...online.records import read_parts, versions
-from ...symbolic import InputError, RunError, StationKeeping
+from ...symbolic import InputError, RunError, Setup
 from ...symbolic.arrays import Array
-from ...symbolic.underwater import STATE_NAMES
 from ..records import OFFLINE_KEY, provenance
 from ..scenario import Scenario
-from .optima import Optima, record_path
+from .optima import Optima, record_path, unit_text
 
 KIND = "ideal weights"
 IDEAL_KEY = OFFLINE_KEY | {"basis"}
@@ -93,7 +92,7 @@ def load_ideal(scenario: Scenario, path: Path) -> Ideal:
         ) from None
     if attributes.get("key") != provenance(scenario, KIND, IDEAL_KEY)["key"]:
         raise InputError(
-            f"the ideal weights of '{path}' belong to another vehicle, game, envelope, basis or "
+            f"the ideal weights of '{path}' belong to another problem, game, envelope, basis or "
             "[offline]; make them again with 'stationkeep offline --ideal-weights N'"
         )
     states, values, gradients = (
@@ -155,28 +154,30 @@ def certified_pairs(optima: Optima, given_up: dict[int, str]) -> tuple[Pairs, li
     return Pairs(optima.states[kept], np.array(values), np.array(gradients)), faults
 
 
-def fit(station: StationKeeping, training: Pairs, held_out: Pairs) -> Fit:
+def fit(setup: Setup, training: Pairs, held_out: Pairs) -> Fit:
     """Fit the weights to the training pairs and measure their errors over the others."""
-    found = fit_weights(station.basis, training)
-    epsilon, epsilon_prime = error_sizes(station.basis, found.weights, held_out)
-    _, difference = representation_errors(station.basis, found.weights, held_out)
-    wrong, right = (effort(station, held_out.states, g) for g in (difference, held_out.gradients))
+    found = fit_weights(setup.basis, training)
+    epsilon, epsilon_prime = error_sizes(setup.basis, found.weights, held_out)
+    _, difference = representation_errors(setup.basis, found.weights, held_out)
+    wrong, right = (effort(setup, held_out.states, g) for g in (difference, held_out.gradients))
     policy = ErrorSize.of(wrong, wrong / right)
     return Fit(found.weights, found.norm, epsilon, epsilon_prime, policy)
 
 
-def effort(station: StationKeeping, states: Array, gradients: Array) -> Array:
+def effort(setup: Setup, states: Array, gradients: Array) -> Array:
     """Return sqrt(v'R_eff v) of v = -R_eff^-1 g'V_ζ / 2 at states and gradients (N, n), (N,)."""
-    g = np.array([station.model.input_matrix(state) for state in states])
+    plant = Plant(setup.problem)
+    g = np.array([plant.terms(state)[1] for state in states])
     push = np.einsum("pnk,pn->pk", g, gradients)
-    squared = np.einsum("pk,kl,pl->p", push, station.game.R_eff_inverse, push)
+    squared = np.einsum("pk,kl,pl->p", push, setup.game.R_eff_inverse, push)
     return np.asarray(0.5 * np.sqrt(squared))
 
 
 def ideal_record(scenario: Scenario, found: Fit, training: Pairs, held_out: Pairs) -> xr.Dataset:
     """Return the record of ideal weights: what the learner, `compare` and `check` start from."""
-    station = scenario.station_keeping()
-    epsilon, epsilon_prime = representation_errors(station.basis, found.weights, held_out)
+    setup = scenario.station_keeping()
+    units = {"units": unit_text(setup.problem.state_units)}
+    epsilon, epsilon_prime = representation_errors(setup.basis, found.weights, held_out)
     gradient = {"units": "cost per unit of the state"}
     data: dict[str, Any] = {
         "ideal_weights": ("basis", found.weights, {"units": "cost"}),
@@ -186,7 +187,7 @@ def ideal_record(scenario: Scenario, found: Fit, training: Pairs, held_out: Pair
     for name, pairs in (("sample", training), ("held_out", held_out)):
         prefix = "" if name == "sample" else "held_out_"
         data |= {
-            f"{prefix}zeta": ((name, "state"), pairs.states, {"units": "m, rad, m/s, rad/s"}),
+            f"{prefix}zeta": ((name, "state"), pairs.states, units),
             f"{prefix}value": (name, pairs.values, {"units": "cost"}),
             f"{prefix}costate": ((name, "state"), pairs.gradients, gradient),
         }
@@ -198,8 +199,8 @@ def ideal_record(scenario: Scenario, found: Fit, training: Pairs, held_out: Pair
     attributes = {
         **provenance(scenario, KIND, IDEAL_KEY),
         **versions(),
-        "basis": station.basis.name,
+        "basis": setup.basis.name,
         "norm": found.norm,
         **sizes,
     }
-    return xr.Dataset(data, {"state": list(STATE_NAMES)}, attributes)
+    return xr.Dataset(data, {"state": list(setup.problem.state_names)}, attributes)

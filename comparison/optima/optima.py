@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...offline import Certificate, OfflineSolver
+from ...offline import Certificate, OfflineSolver, Plant
 from ...online import load, save
 from ...online.records import read_parts, remove_temporaries
 from ...symbolic import InputError
@@ -27,6 +27,11 @@ Chunk = list[tuple[Step, Array]]
 Progress = Callable[[int, int], None]
 
 
+def unit_text(units: Sequence[str]) -> str:
+    """Return the units of states or inputs as an attribute has them, each once: "m, rad"."""
+    return ", ".join(dict.fromkeys(units))
+
+
 def record_path(folder: Path, state: int) -> Path:
     """Return where the optimum from a row of the states is kept."""
     return folder / f"optimal-{state + 1}.nc"
@@ -39,7 +44,7 @@ class Optima:
     Attributes
     ----------
     scenario : the game
-    states : (N, 12)
+    states : (N, n)
     folder : of the records, one a state
     """
 
@@ -84,8 +89,8 @@ class Optima:
 
     def rows(self, given_up: dict[int, str]) -> Iterator[dict[str, Any]]:
         """Yield what is told of each state, in their order, read from the records one by one."""
-        game = self.scenario.station_keeping().game
-        g = self.scenario.station_keeping().model.input_matrix
+        problem = self.scenario.station_keeping().problem
+        plant = Plant(problem)
         for state, zeta in enumerate(self.states):
             if state in given_up:
                 yield _failure(zeta, given_up[state], None)
@@ -97,7 +102,7 @@ class Optima:
                 yield _failure(zeta, str(attributes["failed"]), seconds)
                 continue
             costate = read_parts(path, "costate")[1]["costate"]
-            u_control, u_disturbance = game.policies(g(zeta), costate)
+            u_control, u_disturbance = problem.game.policies(plant.terms(zeta)[1], costate)
             yield {
                 "zeta": zeta,
                 "value": float(attributes["value"]),

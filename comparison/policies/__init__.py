@@ -1,6 +1,15 @@
 """The policies that are compared, by name."""
 
-from .baselines import LQR, Baseline, LinearPolicy
-from .contenders import CONTENDERS, contender
+from .baselines import LQR, LinearPolicy, OnVehicle
+from .contenders import CONTENDERS, AnyPolicy, Contender, available, contender
 
-__all__ = ["CONTENDERS", "LQR", "Baseline", "LinearPolicy", "contender"]
+__all__ = [
+    "CONTENDERS",
+    "LQR",
+    "AnyPolicy",
+    "Contender",
+    "LinearPolicy",
+    "OnVehicle",
+    "available",
+    "contender",
+]

@@ -9,9 +9,9 @@ import numpy as np
 from ...offline import MeshSettings, Trajectory
 from ...offline.direct import StructuredNewton
 from ...offline.path import Grid, graded_mesh
-from ...symbolic import InputError, RunError, StationKeeping
+from ...online.loop import Feedback
+from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
-from .baselines import Baseline
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class PredictionSettings:
             raise InputError("the settings of the model predictive control must be positive")
 
 
-class ModelPredictive(Baseline):
+class ModelPredictive(Feedback):
     """Receding horizon: min over v of ∫_0^T ζ'Qζ + v'R_eff v + ζ(T)'P ζ(T), u_1 = R^-1 R_eff v.
 
     Solved by the structured Newton method from the previous plan, shifted by the time that has passed
@@ -55,11 +55,16 @@ class ModelPredictive(Baseline):
     solves, failures : number of solves, and of those that failed
     """
 
-    def __init__(self, station: StationKeeping, settings: PredictionSettings | None = None) -> None:
-        super().__init__(station)
+    def __init__(
+        self,
+        problem: Problem,
+        settings: PredictionSettings | None = None,
+        *,
+        compiled: bool = True,
+    ) -> None:
+        super().__init__(problem)
         self.settings = s = PredictionSettings() if settings is None else settings
-        problem = station.problem
-        self._newton = StructuredNewton(problem, compiled=station.model.compiled)
+        self._newton = StructuredNewton(problem, compiled=compiled)
         mesh = graded_mesh(s.horizon, s.intervals, s.grading)
         self._grid = Grid(mesh, s.degree, problem.n_inputs)
         self._linear = problem.linear_gain
@@ -78,7 +83,7 @@ class ModelPredictive(Baseline):
             v = self._plan.sample(np.array([self._age]))[1][0]
         self._age += dt
         self._since += dt
-        return self.station.game.players(v)[0]
+        return self.problem.game.players(v)[0]
 
     def _solve(self, zeta: Array) -> None:
         s, grid = self.settings, self._grid

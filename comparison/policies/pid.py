@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...online.loop import Feedback
 from ...symbolic import StationKeeping
 from ...symbolic.arrays import Array
-from .baselines import Baseline
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class CascadeSettings:
     rate: float = 0.5
 
 
-class CascadedPID(Baseline):
+class CascadedPID(Feedback):
     """P on pose, PI on body velocity, feed-forward of the trim.
 
         ν_set = clip(-ω_o J^-1 (p, φ, θ, ψ)),   τ = k_p (ν_set - ν) + z,   z_dot = k_i (ν_set - ν)
 
-    (p, φ, θ, ψ) is the pose error, and the trim that balances weight and buoyancy is added by `step`.
+    (p, φ, θ, ψ) is the pose error; `OnVehicle` adds the trim that balances weight and buoyancy.
     There is no D: the acceleration is not measured. An axis does not integrate while it asks for more
     than the thrusters can give it, in the direction in which it does (anti-windup).
 
@@ -58,7 +58,8 @@ class CascadedPID(Baseline):
     """
 
     def __init__(self, station: StationKeeping, settings: CascadeSettings | None = None) -> None:
-        super().__init__(station)
+        super().__init__(station.problem)
+        self.station = station
         self.settings = CascadeSettings() if settings is None else settings
         s, vehicle = self.settings, station.model.vehicle
         self.outer = np.repeat([s.position, s.attitude], 3)

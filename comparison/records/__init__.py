@@ -1,11 +1,14 @@
 """Runs and optima as records that are kept, and run again from what they hold alone."""
 
 from .clairvoyant import KIND, clairvoyant_record, optimum_name
+from .recorded import recorded_scenario
 from .replay import BIT_EQUAL, DIFFERENT, Replay, replay
+from .running import closed_loop
 from .runs import (
     FORMAT,
     OFFLINE_KEY,
     contender_record,
+    model_text,
     online_record,
     optimal_record,
     optimum_or_failure,
@@ -23,13 +26,16 @@ __all__ = [
     "OFFLINE_KEY",
     "Replay",
     "clairvoyant_record",
+    "closed_loop",
     "contender_record",
+    "model_text",
     "online_record",
     "optimal_record",
     "optimum_name",
     "optimum_or_failure",
     "optimum_provenance",
     "provenance",
+    "recorded_scenario",
     "replay",
     "reused",
     "trajectory_of",

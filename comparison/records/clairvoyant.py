@@ -167,7 +167,7 @@ def _policies(plant: HeldPlant) -> Iterator[Policy]:
     presents itself to the water is what local minima differ by.
     """
     station, still = plant.station, np.zeros(6)
-    gain, model = LQR(station).gain, station.model
+    gain, model = LQR(station.problem).gain, station.model
 
     def towards(target: Array) -> Policy:
         def policy(t: float, zeta: Array) -> Array:
@@ -210,7 +210,11 @@ def self_check(plant: HeldPlant, zeta0: Array, path: Trajectory) -> SelfCheck:
     RunError
         If the integration fails.
     """
-    collocated, half_widths, gain = path.at_mesh(), plant.station.half_widths, LQR(plant.station).gain
+    collocated, half_widths, gain = (
+        path.at_mesh(),
+        plant.station.half_widths,
+        LQR(plant.station.problem).gain,
+    )
     y, defects = np.append(zeta0, 0.0), []
     atol = 1e-12 * np.append(half_widths, 1.0)
     for i, span in enumerate(pairwise(path.mesh)):

@@ -11,6 +11,8 @@ import xarray as xr
 from casadi import SX
 
 from ...symbolic import InputError, Vehicle
+from ...symbolic.expressions import from_data, to_data
+from ...symbolic.game import problem_from_data
 from ...symbolic.toml import validate
 from ..scenario import Files, Scenario
 
@@ -20,15 +22,15 @@ WEIGHTS, BASIS = "initial_weights", "basis_function"  # variables of a record
 def with_files(record: xr.Dataset, scenario: Scenario) -> xr.Dataset:
     """Return the record of an online run with the weights and the basis that came from a user's files.
 
-    A basis is kept as the text of a CasADi function, since its file may import others.
+    A basis is kept as its instructions, since its file may import others.
     """
     weights = scenario.initial_weights()
     if weights is not None:
         record[WEIGHTS] = (("initial_weight",), weights, {"units": "cost"})
     if ":" in scenario.basis.name:
-        x = SX.sym("x", len(scenario.envelope.half_widths))
-        function = casadi.Function("basis", [x], [scenario.basis_function()(x)])
-        record[BASIS] = ((), function.serialize(), {"units": "1"})
+        x = SX.sym("x", scenario.setup().problem.n_states)
+        function = casadi.Function("basis", [x], [scenario.basis_function()(x)], ["x"], ["sigma"])
+        record[BASIS] = ((), json.dumps(to_data(function)), {"units": "1"})
     return record
 
 
@@ -41,21 +43,21 @@ def files_of(record: xr.Dataset, scenario: Scenario) -> Files:
         If they can't be read by this version, or one is missing.
     """
     try:
-        vehicles = {scenario.vehicle: _vehicle(record, "vehicle")}
+        vehicles, problems, bases = {}, {}, {}
+        if scenario.vehicle is not None:
+            vehicles[scenario.vehicle] = _vehicle(record, "vehicle")
+        if scenario.problem is not None:
+            data = as_settings(record.attrs["problem"], "problem")
+            problems[scenario.problem] = problem_from_data(data)
         if scenario.simulation.plant is not None and record.attrs["plant"]:
             vehicles[scenario.simulation.plant] = _vehicle(record, "plant")
-        bases = {}
         if BASIS in record:
-            bases[scenario.basis.name] = casadi.Function.deserialize(str(record[BASIS].values))
+            data = as_settings(str(record[BASIS].values), "basis")
+            bases[scenario.basis.name] = from_data(data)
     except KeyError as error:
         raise InputError(f"the record has no attribute {error}; make it again") from None
-    except RuntimeError:
-        raise InputError(
-            "the basis in the record can't be read by this version of CasADi; use the one that wrote "
-            f"it ({record.attrs.get('casadi_version', 'unknown')})"
-        ) from None
     weights = np.array(record[WEIGHTS].values, dtype=np.float64) if WEIGHTS in record else None
-    return Files(vehicles, bases, weights)
+    return Files(vehicles, problems, bases, weights)
 
 
 def _vehicle(record: xr.Dataset, name: str) -> Vehicle:

@@ -10,8 +10,8 @@ import xarray as xr
 
 from ...offline import OfflineSolver, Trajectory
 from ...online import load
+from ...online.loop import Progress
 from ...online.records import read_parts
-from ...online.vehicle import Progress
 from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ...symbolic.toml import validate
@@ -72,7 +72,7 @@ def recorded_scenario(record: xr.Dataset) -> Scenario:
         (OPTIMAL, CLAIRVOYANT)
     ):  # doesn't depend on a basis, nor needs its file
         scenario = scenario.model_copy(
-            update={"basis": scenario.basis.model_copy(update={"name": "drag"})}
+            update={"basis": scenario.basis.model_copy(update={"name": "quadratic"})}
         )
     return restored(scenario.model_dump_json(), None, files_of(record, scenario))
 
@@ -100,7 +100,7 @@ def run_again(record: xr.Dataset, folder: Path, progress: Progress | None = None
         return clairvoyant_or_failure(scenario, clairvoyant_provenance(scenario))
     zeta0, key = _start(scenario, kind)
     guess = _guess(folder, key) if key else None
-    solver = OfflineSolver(scenario.station_keeping().problem, scenario.offline)
+    solver = OfflineSolver(scenario.setup().problem, scenario.offline)
     attributes = optimum_provenance(scenario, zeta0, key)
     return optimum_or_failure(scenario, solver, zeta0, attributes, guess)
 
@@ -109,7 +109,7 @@ def _start(scenario: Scenario, kind: str) -> tuple[Array, str]:
     """Return the initial state of an optimum, and the key of the record that it started from."""
     numbers, _, key = kind.removeprefix(OPTIMAL).partition(GUESSED)
     try:
-        problem = scenario.station_keeping().problem
+        problem = scenario.setup().problem
         return problem.require_state(np.array(json.loads(numbers), dtype=float)), key
     except (ValueError, TypeError):
         raise InputError(f"the record's kind is '{kind}', but must name an initial state") from None

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...online.vehicle import Progress
+from ...online.loop import Progress
 from ...symbolic.arrays import Array
 from .recorded import load_run, run_again
 

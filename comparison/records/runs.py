@@ -15,18 +15,23 @@ import numpy as np
 import xarray as xr
 
 from ...offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
-from ...online import Policy, load, run, save, to_dataset
-from ...online.records import versions
-from ...online.vehicle import Progress
-from ...symbolic import InputError, RunError, StationKeeping
+from ...online import (
+    load,
+    save,
+    to_dataset,
+)
+from ...online.loop import Progress
+from ...online.records import listed, versions
+from ...symbolic import InputError, RunError, Setup, StationKeeping
 from ...symbolic.arrays import Array
-from ...symbolic.underwater import STATE_NAMES
-from ..policies import contender
+from ...symbolic.game import problem_to_data
+from ..policies import AnyPolicy, contender
 from ..scenario import Scenario
 from .record_files import with_files
+from .running import closed_loop
 
-FORMAT = 7  # of the records; raise it when what is in them, or how a run is made, changes
-OFFLINE_KEY = {"vehicle", "current", "game", "envelope", "offline"}
+FORMAT = 8  # of the records; raise it when what is in them, or how a run is made, changes
+OFFLINE_KEY = {"vehicle", "problem", "current", "game", "envelope", "offline"}
 
 
 def provenance(
@@ -37,12 +42,12 @@ def provenance(
     `key` is the hash of what the numbers depend on: the settings (those named in `include`, or all),
     the vehicle's parameters, the compiled functions and the versions.
     """
-    station = scenario.station_keeping()
-    vehicle = station.model.vehicle
+    setup = scenario.setup()
+    plant_data = model_text(setup)
     text = scenario.model_dump_json(include=include)
     learned = include is None or "basis" in include
-    functions = station.fingerprint if learned else station.plant_fingerprint
-    parts = [str(FORMAT), kind, text, vehicle.model_dump_json(), functions]
+    functions = setup.fingerprint if learned else setup.plant_fingerprint
+    parts = [str(FORMAT), kind, text, plant_data, functions]
     parts.append(repr(sorted(versions().items())))
     start = scenario.initial_weights() if include is None else None
     parts.append("" if start is None else start.tobytes().hex())
@@ -54,7 +59,7 @@ def provenance(
     return {
         "kind": kind,
         "scenario": scenario.model_dump_json(),
-        "vehicle": vehicle.model_dump_json(),
+        "vehicle" if scenario.problem is None else "problem": plant_data,
         "plant": plant,
         "mode": scenario.simulation.mode,
         "seed": scenario.samples.seed,
@@ -63,6 +68,13 @@ def provenance(
         "machine": machine(),
         "key": key,
     }
+
+
+def model_text(setup: Setup) -> str:
+    """Return what policies are made for, as JSON: a vehicle's parameters, or a problem's equations."""
+    if isinstance(setup, StationKeeping):
+        return setup.model.vehicle.model_dump_json()
+    return json.dumps(problem_to_data(setup.problem))
 
 
 def machine() -> str:
@@ -75,7 +87,7 @@ def online_record(
     scenario: Scenario,
     path: Path | None = None,
     *,
-    policy: Callable[[], Policy] | None = None,
+    policy: Callable[[], AnyPolicy] | None = None,
     kind: str = "learned",
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -89,7 +101,7 @@ def online_record(
     attributes = provenance(scenario, kind)
 
     def make() -> xr.Dataset:
-        history = run(scenario, None if policy is None else policy(), progress)
+        history = closed_loop(scenario, None if policy is None else policy(), progress)
         attributes["wall_seconds"] = history.wall_seconds
         return with_files(to_dataset(history, attributes), scenario)
 
@@ -162,7 +174,7 @@ def optimum_or_failure(
 def failure_record(zeta0: Array, attributes: dict[str, Any]) -> xr.Dataset:
     """Return the record of a solve from ζ_0 that failed: the state, versions, no trajectory."""
     attributes = attributes | versions()
-    return xr.Dataset({"zeta": ("state", zeta0)}, {"state": list(STATE_NAMES)}, attributes)
+    return xr.Dataset({"zeta": ("state", zeta0)}, attrs=attributes)
 
 
 def _solve(solver: OfflineSolver, zeta0: Array, guess: Trajectory | None) -> OfflineSolution:
@@ -190,11 +202,11 @@ def optimum_to_dataset(
 ) -> xr.Dataset:
     """Return the record of an offline solution: trajectory, forces, cost and certificate."""
     path, direct = solution.direct.trajectory, solution.direct
-    station = scenario.station_keeping()
-    u_control, u_disturbance = path.players(station.game)
-    local = station.game.local_cost(path.states[1:], u_control, u_disturbance)
-    dataset = path_dataset(station, path, u_control, local, attributes | _described(solution))
-    forces, units = ("node", "force"), {"units": "N, N m"}
+    setup = scenario.setup()
+    u_control, u_disturbance = path.players(setup.game)
+    local = setup.game.local_cost(path.states[1:], u_control, u_disturbance)
+    dataset = path_dataset(setup, path, u_control, local, attributes | _described(solution))
+    forces, units = ("node", "input"), {"units": listed(setup.problem.input_units)}
     more = {
         "u_disturbance": (forces, u_disturbance, units),
         "v": (forces, path.v, units),
@@ -204,28 +216,24 @@ def optimum_to_dataset(
 
 
 def path_dataset(
-    station: StationKeeping,
+    setup: Setup,
     path: Trajectory,
     u_control: Array,
     local: Array,
     attributes: dict[str, Any],
 ) -> xr.Dataset:
-    """Return the record of a collocated way: states, control, wrench and cost.
+    """Return the record of a collocated way: states, control, cost, and a vehicle's wrench.
 
     Parameters
     ----------
-    u_control : (K d, 6) at the collocation points
+    u_control : (K d, k) at the collocation points
     local : (K d,) cost rate there
     """
-    tau_b = [
-        station.model.kinematics(zeta[:6])[0].T @ (u + station.model.u_trim)
-        for zeta, u in zip(path.states[1:], u_control, strict=True)
-    ]
-    forces, units = ("node", "force"), {"units": "N, N m"}
+    problem = setup.problem
+    units = {"units": listed(problem.input_units)}
     data = {
-        "zeta": (("time", "state"), path.states, {"units": "m, rad, m/s, rad/s"}),
-        "u_control": (forces, u_control, units),
-        "tau_b": (forces, np.array(tau_b), units),
+        "zeta": (("time", "state"), path.states, {"units": listed(problem.state_units)}),
+        "u_control": (("node", "input"), u_control, units),
         "local_cost": (("node",), local, {"units": "cost/s"}),
         "cost": (("time",), path.quadrature(local), {"units": "cost"}),
     }
@@ -233,9 +241,18 @@ def path_dataset(
         "time": ("time", path.times, {"units": "s"}),
         "node": ("node", path.times[1:], {"units": "s"}),
         "mesh": ("mesh", path.mesh, {"units": "s"}),
-        "state": list(STATE_NAMES),
+        "state": list(problem.state_names),
+        "input": list(problem.input_names),
     }
-    return xr.Dataset(data, coordinates, attributes)
+    record = xr.Dataset(data, coordinates, attributes)
+    if isinstance(setup, StationKeeping):
+        tau_b = [
+            setup.model.kinematics(zeta[:6])[0].T @ (u + setup.model.u_trim)
+            for zeta, u in zip(path.states[1:], u_control, strict=True)
+        ]
+        record["tau_b"] = (("node", "force"), np.array(tau_b), units)
+        record = record.assign_coords(force=list(problem.input_names))
+    return record
 
 
 def _described(solution: OfflineSolution) -> dict[str, Any]:

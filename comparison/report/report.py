@@ -132,7 +132,7 @@ def write_report(
 
 def _asked(comparison: Comparison) -> str:
     scenario = comparison.scenario
-    state = ", ".join(f"{value:g}" for value in scenario.simulation.initial_state)
+    state = ", ".join(f"{value:g}" for value in scenario.initial_state)
     others = comparison.n_states - 1
     more = f" and from {others} random states of the envelope" if others else ""
     if scenario.simulation.mode == "game":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import xarray as xr
 
@@ -27,8 +29,8 @@ def verdict(comparison: Comparison) -> str:
     """Return the outcome in one sentence."""
     if comparison.disturbed or comparison.regret is None:
         return _disturbed_verdict(comparison)
-    learned, linear = (comparison.regret[name]["median"] for name in ("learned", "linear"))
-    if learned is None or linear is None:
+    learned, linear = (comparison.regret[name].median for name in ("learned", "linear"))
+    if not (math.isfinite(learned) and math.isfinite(linear)):
         return "A run ended early, so there is no regret to compare."
     change = 100 * (learned - linear) / linear
     outcome = f"takes {-change:.0f} % off" if change < 0 else f"adds {change:.0f} % to"
@@ -114,8 +116,8 @@ def _judgement(comparison: Comparison, name: str) -> list[str]:
         row.append(_number(metrics.regret, ".3f", 100.0))
         alone = len(comparison.all_metrics[name]) == 1
         row += [
-            "–" if alone else _number(regret[name][key], ".3f", 100.0)
-            for key in (("median", "max") if comparison.n_states > 1 else ())
+            "–" if alone else _number(value, ".3f", 100.0) if math.isfinite(value) else "∞"
+            for value in ((regret[name].median, regret[name].max) if comparison.n_states > 1 else ())
         ]
     if comparison.disturbed:
         row.append(_number(comparison.margins.get(name), ".3g"))

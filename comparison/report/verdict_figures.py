@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from matplotlib.ticker import StrMethodFormatter
 
 from ...symbolic.arrays import Array
-from ..merit import RunMetrics, cost_to_date
+from ..merit import Regret, RunMetrics, cost_to_date
 from ..policies import CONTENDERS
 from ..study import Comparison
 from .style import COLORS, OPTIMAL, Page, legend_below, time_axis
@@ -68,8 +70,8 @@ def draw_regrets(page: Page, comparison: Comparison) -> None:
             spread = np.linspace(-0.22, 0.22, len(percent)) if len(percent) > 1 else [0.0]
             axes.plot(percent, row + np.array(spread[: len(percent)]), "o", color=COLORS[name], ms=4)
             label = CONTENDERS[name].label
-            if len(percent):
-                middle = float(np.median(percent))
+            middle = 100.0 * Regret.of(regrets).median
+            if 0.0 < middle < math.inf:
                 axes.plot([middle] * 2, [row - 0.36, row + 0.36], color="black", lw=2.0)
                 label += f", {middle:.2g} %" if middle < 100.0 else f", {middle:.0f} %"
             lost = sum(r is None for r in regrets)
@@ -127,7 +129,8 @@ def draw_energy(page: Page, comparison: Comparison) -> None:
 
 
 def _needed(run: RunMetrics, electrical: bool) -> float:
-    return float(run.energy) if electrical and run.energy is not None else run.effort
+    found = run.energy if electrical else run.effort
+    return math.nan if found is None else found
 
 
 def _above(comparison: Comparison) -> tuple[dict[str, tuple[Array, Array]], str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
-from ...symbolic import Vehicle
+from ...symbolic import Problem, Vehicle
 from ...symbolic.arrays import Array
 from ...symbolic.value import BasisFunction
 
@@ -17,11 +17,13 @@ class Files:
     Attributes
     ----------
     vehicles : of `vehicle` and `simulation.plant`, by name
+    problems : of `problem`, by name
     bases : of `basis.name`, functions of the scaled state, by name
     weights : (m,) that the learner starts from; None where no file says
     """
 
     vehicles: Mapping[str, Vehicle] = field(default_factory=dict)
+    problems: Mapping[str, Problem] = field(default_factory=dict)
     bases: Mapping[str, BasisFunction] = field(default_factory=dict)
     weights: Array | None = None
 

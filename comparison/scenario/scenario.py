@@ -3,69 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, model_validator
 
 from ...offline import OfflineSettings
 from ...online import LearnerSettings, SampleSettings, SimulationSettings, load_weights
 from ...symbolic import (
-    Basis,
-    Game,
-    GammaTooSmallError,
     InputError,
     Model,
-    Problem,
+    Setup,
     StationKeeping,
     Vehicle,
     find_function,
-    gamma_star,
     require_vehicle_state,
 )
 from ...symbolic.arrays import Array, Vector3
-from ...symbolic.game import weight_matrix
+from ...symbolic.pyfile import is_named
 from ...symbolic.toml import Settings, locate, read_toml, shipped_names, validate
 from ...symbolic.underwater import STATE_NAMES
 from ...symbolic.value import BasisFunction
+from .building import file_in, find_problem, named_in, problem_setup, vehicle_problem, vehicle_setup
+from .defaults import problem_defaults
 from .files import Files
 from .overrides import override, replace_value
+from .rules import require_keys, require_level, require_start
 from .settings import BasisSettings, EnvelopeSettings, GameSettings
 
 Restore = Callable[[str, Path | None, Files], "Scenario"]
 DEFAULT = "bluerov2-heavy"
-STATION = {"vehicle", "vehicle_parameters", "current", "game", "envelope", "basis"}
+STATION = {"vehicle", "problem", "vehicle_parameters", "current", "game", "envelope", "basis"}
 
 
 class Scenario(Settings):
-    """Vehicle, game, envelope, basis, learner, samples, simulation and offline solve.
+    """A vehicle or a problem, its game, envelope, basis, learner, samples, simulation, offline solve.
 
     Attributes
     ----------
     vehicle : a shipped name or the path of a TOML file
+    problem : "file.py:name" of a `Problem`, or of a function that returns one, in place of a vehicle
     vehicle_parameters : parameters that replace those of the vehicle's file
     current : known steady current in the earth frame [m/s], balanced by the trim
     """
 
-    vehicle: str
+    vehicle: str | None = None
+    problem: str | None = None
     vehicle_parameters: dict[str, Any] = Field(default_factory=dict)
     current: Vector3 = (0.0, 0.0, 0.0)
-    game: GameSettings
-    envelope: EnvelopeSettings
+    game: GameSettings = GameSettings()
+    envelope: EnvelopeSettings = EnvelopeSettings()
     basis: BasisSettings = BasisSettings()
     learner: LearnerSettings = LearnerSettings()
     samples: SampleSettings = SampleSettings()
-    simulation: SimulationSettings
+    simulation: SimulationSettings = SimulationSettings()
     offline: OfflineSettings = OfflineSettings()
 
     _folder: Path | None = PrivateAttr(default=None)
     _files: Files = PrivateAttr(default_factory=Files)
 
+    @model_validator(mode="after")
+    def _one_plant(self) -> Scenario:
+        if (self.vehicle is None) == (self.problem is None):
+            given = "both" if self.vehicle is not None else "neither"
+            raise ValueError(f"{given} 'vehicle' and 'problem' are given; give one of the two")
+        require_keys(self, self.problem)
+        return self
+
     @classmethod
     def load(cls, name: str | Path = DEFAULT, overrides: Sequence[str] = ()) -> Scenario:
-        """Load a shipped scenario by name, or a user's by the path of its TOML file.
+        """Load a shipped scenario by name, a user's by its TOML file, or a problem by "file.py:name".
 
         Parameters
         ----------
@@ -76,12 +86,18 @@ class Scenario(Settings):
         InputError
             If there is no such scenario or it breaks a rule; one sentence says which.
         """
-        path = locate(name, __package__, "scenarios", "scenario")
-        data = read_toml(path)
+        data, folder = _read(name)
         for text in overrides:
             override(data, text)
+        files = Files()
+        if isinstance(data.get("problem"), str):
+            problem = find_problem(named_in(folder, data["problem"]))
+            files = Files(problems={data["problem"]: problem})
+            for group, keys in problem_defaults(problem).items():
+                if isinstance(data.get(group, {}), dict):
+                    data[group] = keys | data.get(group, {})
         scenario = validate(cls, data, f"scenario '{name}'")
-        scenario._folder = path.parent
+        scenario._folder, scenario._files = folder, files
         scenario._require_start()
         return scenario
 
@@ -101,7 +117,7 @@ class Scenario(Settings):
         changed = validate(Scenario, data, "scenario")
         changed._folder, changed._files = self._folder, self._files.without(groups)
         if not STATION & set(groups):
-            changed.use_station(self._station_keeping)
+            changed.use_setup(self._setup)
         return changed
 
     def with_values(self, values: Mapping[str, Any], where: str = "scenario") -> Scenario:
@@ -116,30 +132,41 @@ class Scenario(Settings):
         for key, value in values.items():
             replace_value(data, key, value, where)
         changed = validate(Scenario, data, where)
-        changed._folder = self._folder
+        changed._folder, changed._files = self._folder, Files(problems=self._files.problems)
         return changed
 
-    def station_text(self) -> str:
-        """Return the settings that `station_keeping` depends on, as JSON."""
+    def setup_text(self) -> str:
+        """Return the settings that `setup` depends on, as JSON."""
         return self.model_dump_json(include=STATION)
 
-    def use_station(self, station: StationKeeping) -> None:
-        """Take what another scenario with the same `station_text` has built."""
-        self.__dict__["_station_keeping"] = station
+    def use_setup(self, setup: Setup) -> None:
+        """Take what another scenario with the same `setup_text` has built."""
+        self.__dict__["_setup"] = setup
 
     def __reduce__(self) -> tuple[Restore, tuple[str, Path | None, Files]]:
         """Pickle as JSON, the scenario's folder and files: what is compiled can't be pickled."""
-        return restored, (self.model_dump_json(), self._folder, self._files)
+        files = replace(self._files, problems={})  # an expression can't be pickled
+        return restored, (self.model_dump_json(), self._folder, files)
 
-    def station_keeping(self) -> StationKeeping:
-        """Return vehicle, game and basis, compiled when first used; built once a scenario.
+    def setup(self) -> Setup:
+        """Return problem, basis and envelope, compiled when first used; built once a scenario.
 
         Raises
         ------
         InputError
-            If the vehicle, the game or the basis breaks a rule; γ too small names γ*.
+            If the vehicle, the problem, the game or the basis breaks a rule; γ too small names γ*.
         """
-        return self._station_keeping
+        return self._setup
+
+    def station_keeping(self) -> StationKeeping:
+        """Return the setup of a vehicle's scenario; raises InputError for that of another problem."""
+        setup = self._setup
+        if not isinstance(setup, StationKeeping):
+            raise InputError(
+                f"this needs a vehicle, but the scenario is of the problem '{self.problem}'; give a "
+                "scenario of a vehicle"
+            )
+        return setup
 
     def initial_weights(self) -> Array | None:
         """Return the learner's initial weights, or None for `weight_factor` times the Riccati weights.
@@ -159,7 +186,7 @@ class Scenario(Settings):
             return None
         path = self._path(learner.weights)
         weights = load_weights(path) * learner.weight_factor
-        n_basis = self._station_keeping.basis.n_basis
+        n_basis = self._setup.basis.n_basis
         if weights.shape != (n_basis,):
             raise InputError(
                 f"'{path}' holds {weights.size} weights, but basis '{self.basis.name}' has {n_basis}; "
@@ -169,9 +196,9 @@ class Scenario(Settings):
 
     def _riccati_weights(self, vehicle: str) -> Array:
         """Return W with W'σ(ζ) = ζ'P ζ for the P of this game on another vehicle, shape (m,)."""
-        station = self._station_keeping
+        setup = self._setup
         model = Model(self._load_vehicle(vehicle), self.current)
-        return station.basis.quadratic_weights(self._problem(model, station.half_widths).P)
+        return setup.basis.quadratic_weights(vehicle_problem(model, self.game, setup.half_widths).P)
 
     def plant_vehicle(self) -> Vehicle | None:
         """Return the vehicle that is driven where it is not the scenario's own, else None.
@@ -182,20 +209,24 @@ class Scenario(Settings):
             If there is no such vehicle or its file breaks a rule.
         """
         name, changes = self.simulation.plant, self.simulation.plant_parameters
+        if self.vehicle is None:
+            return None
         if name is None:
             return self.model_vehicle().replaced(changes, "the plant") if changes else None
         return self._load_vehicle(name).replaced(changes, f"vehicle '{name}'")
 
     def model_vehicle(self) -> Vehicle:
         """Return the vehicle that the policies are made for; raises as `plant_vehicle`."""
+        if self.vehicle is None:
+            raise InputError(f"the scenario is of the problem '{self.problem}', which has no vehicle")
         return self._load_vehicle(self.vehicle).replaced(
             self.vehicle_parameters, f"vehicle '{self.vehicle}'"
         )
 
     def file_contents(self) -> list[str]:
-        """Return what is in the user's files of a basis and of initial weights, hexadecimal."""
-        name, separator, _ = self.basis.name.rpartition(":")
-        paths = [self._path(name)] if separator else []
+        """Return what is in the user's files of problem, basis and initial weights, hexadecimal."""
+        named = [text.rpartition(":") for text in (self.problem or "", self.basis.name)]
+        paths = [self._path(name) for name, separator, _ in named if separator]
         if self.learner.weights != "riccati":
             paths.append(self._path(self.learner.weights))
         return [path.read_bytes().hex() for path in paths if path.is_file()]
@@ -204,44 +235,37 @@ class Scenario(Settings):
         """Return σ as a function of the scaled state; raises InputError if it can't be found."""
         if self.basis.name in self._files.bases:
             return self._files.bases[self.basis.name]
-        name, separator, function = self.basis.name.rpartition(":")
-        return find_function(f"{self._path(name)}:{function}" if separator else function)
+        return find_function(named_in(self._folder, self.basis.name))
 
     @property
     def initial_state(self) -> Array:
-        """ζ(0), shape (12,)."""
-        return np.array(self.simulation.initial_state)
+        """ζ(0), (n,): the settings', or half of the envelope's half-widths."""
+        given = self.simulation.initial_state
+        return 0.5 * self._setup.envelope if given is None else np.array(given)
 
     @cached_property
-    def _station_keeping(self) -> StationKeeping:
-        model = Model(self.model_vehicle(), self.current)
-        half_widths = np.array(self.envelope.half_widths)
-        problem = self._problem(model, half_widths)
-        _ = problem.P  # refuses a gamma without stabilising solution
-        basis = Basis.build(self.basis.name, self.basis_function(), problem.zeta, half_widths)
-        return StationKeeping(
-            problem=problem,
-            basis=basis,
-            envelope=self.envelope.scale * half_widths,
-            compiled=model.compiled,
-            model=model,
-        )
+    def _setup(self) -> Setup:
+        basis = (self.basis.name, self.basis_function())
+        if self.problem is None:
+            vehicle = self.model_vehicle()
+            return vehicle_setup(vehicle, self.current, self.game, self.envelope, basis)
+        found = self._files.problems.get(self.problem)
+        problem = find_problem(named_in(self._folder, self.problem)) if found is None else found
+        return problem_setup(problem, self.game, self.envelope, basis)
 
     def _require_start(self) -> None:
-        state, simulation = require_vehicle_state(self.simulation.initial_state), self.simulation
-        far = np.abs(state) / np.array(self.envelope.half_widths)
-        if far.max() > simulation.chi:
-            name = STATE_NAMES[int(far.argmax())]
-            raise InputError(
-                f"the initial state's {name} is {far.max():.2f} half-widths of the "
-                f"envelope, but a run ends beyond chi = {simulation.chi:g}; start closer or raise "
-                "simulation.chi"
-            )
-        if abs(np.degrees(state[4])) > simulation.pitch_limit:
-            raise InputError(
-                f"the initial state's pitch is {np.degrees(state[4]):.1f} deg, but a run ends beyond "
-                f"{simulation.pitch_limit:g} deg; start closer to level or raise simulation.pitch_limit"
-            )
+        given = self.simulation.initial_state
+        if given is None:
+            return
+        if self.problem is None:
+            state = require_vehicle_state(given)
+            widths = self.envelope.half_widths or ()
+            require_start(self.simulation, state, STATE_NAMES, widths)
+            require_level(self.simulation, float(state[4]))
+        else:
+            problem = self._setup.problem
+            state = problem.require_state(given)
+            require_start(self.simulation, state, problem.state_names, problem.scale)
 
     def _load_vehicle(self, name: str) -> Vehicle:
         if name in self._files.vehicles:
@@ -249,27 +273,16 @@ class Scenario(Settings):
         named = "/" not in name and not name.endswith(".toml")
         return Vehicle.load(name if named else self._path(name))
 
-    def _problem(self, model: Model, half_widths: Array) -> Problem:
-        settings = self.game
-        W_d = settings.R if isinstance(settings.W_d, str) else settings.W_d
-        weights = {"Q": settings.Q, "R": settings.R, "W_d": W_d}
-        huge = Game(
-            **{name: weight_matrix(name, value) for name, value in weights.items()}, gamma=np.inf
-        )
-        problem = model.problem(huge, half_widths)
-        try:
-            return problem.with_game(Game(huge.Q, huge.R, huge.W_d, settings.gamma))
-        except GammaTooSmallError as error:
-            star = gamma_star(*problem.linearization, huge.Q, huge.R, huge.W_d)
-            raise GammaTooSmallError(settings.gamma, error.threshold, star) from None
-
     def _path(self, text: str) -> Path:
-        """Resolve a path in the scenario: absolute, or relative to the working or its own folder."""
-        path = Path(text).expanduser()
-        if path.is_absolute() or path.exists() or self._folder is None:
-            return path
-        beside = self._folder / path
-        return beside if beside.exists() else path
+        return file_in(self._folder, text)
+
+
+def _read(name: str | Path) -> tuple[dict[str, Any], Path | None]:
+    """Return the settings of a scenario's file and its folder; a problem's name is its only setting."""
+    if isinstance(name, str) and is_named(name):
+        return {"problem": name}, None
+    path = locate(name, __package__, "scenarios", "scenario")
+    return read_toml(path), path.parent
 
 
 def restored(text: str, folder: Path | None, files: Files) -> Scenario:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import PositiveFloat, model_validator
 
 from ...symbolic.toml import Settings
 
@@ -10,42 +10,45 @@ Weight = list[float] | list[list[float]]
 
 
 class GameSettings(Settings):
-    """Weights of (5); a list is a diagonal.
+    """Weights of (5); a list is a diagonal. A vehicle needs Q, R and gamma; a problem brings its own.
 
     Attributes
     ----------
-    Q : 12 or 12x12; R : 6 or 6x6
-    W_d : 6 or 6x6, or the word "R" for W_d = R; the paper's is the identity
+    Q : n or n x n; R : k or k x k
+    W_d : k or k x k, the word "R" for W_d = R, or "I" for the paper's, the identity
     gamma : attenuation level [-]
     """
 
-    Q: Weight
-    R: Weight
-    W_d: Weight | str = Field(default_factory=lambda: [1.0] * 6)
-    gamma: PositiveFloat
+    Q: Weight | None = None
+    R: Weight | None = None
+    W_d: Weight | str = "I"
+    gamma: PositiveFloat | None = None
 
     @model_validator(mode="after")
     def _word(self) -> GameSettings:
-        if isinstance(self.W_d, str) and self.W_d != "R":
+        if isinstance(self.W_d, str) and self.W_d not in ("R", "I"):
             raise ValueError(
-                f"W_d is '{self.W_d}', but must be a matrix, a diagonal, or the word \"R\""
+                f'W_d is \'{self.W_d}\', but must be a matrix, a diagonal, or the word "R" or "I"'
             )
         return self
 
 
 class EnvelopeSettings(Settings):
-    """Where the vehicle is expected: half-widths of the states [m, rad, m/s, rad/s].
+    """Where the plant is expected: half-widths of the states, in their units.
 
-    `scale` is the part of it in which samples are drawn and policies compared.
+    `scale` is the part of it in which samples are drawn and policies compared. A problem has
+    half-widths of its own, which are taken where none are given.
     """
 
-    half_widths: tuple[float, ...] = Field(min_length=12, max_length=12)
+    half_widths: tuple[float, ...] | None = None
     scale: PositiveFloat = 1.0
 
     @model_validator(mode="after")
     def _positive(self) -> EnvelopeSettings:
-        if min(self.half_widths) <= 0.0:
-            raise ValueError(f"half_widths must be positive, but one is {min(self.half_widths)}")
+        if self.half_widths is not None and min(self.half_widths, default=0.0) <= 0.0:
+            raise ValueError(
+                f"half_widths must be positive, but one is {min(self.half_widths, default=0.0)}"
+            )
         return self
 
 

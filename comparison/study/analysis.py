@@ -12,7 +12,7 @@ import xarray as xr
 
 from ...offline import Pairs, error_sizes, fit_weights
 from ...offline.ideal_weights import least_states
-from ...online.rows import BellmanTerms, bellman_error
+from ...online.paper import BellmanTerms, bellman_error
 from ...symbolic import InputError, RunError, StationKeeping
 from ...symbolic.arrays import Array
 from ...symbolic.errors import nearest
@@ -142,7 +142,7 @@ def _along(station: StationKeeping, learned: xr.Dataset, value: GameValue) -> xr
     last = int(over[-1]) if len(over) else len(time) - 1
     chosen = np.unique(np.linspace(0, last, N_ALONG).astype(int))
     critic = weights_in_use(learned, "critic", time[chosen])
-    linear = LinearPolicy(station)
+    linear = LinearPolicy(station.problem)
     columns: dict[str, list[float]] = {name: [] for name in _ALONG}
     for i, weights in zip(chosen, critic, strict=True):
         try:

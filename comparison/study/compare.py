@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import xarray as xr
 
 from ...online import draw_samples, load
 from ...symbolic import RunError, StationKeeping
-from ..merit import GameValue, RunMetrics, dissipation_margin, distribution
+from ..merit import GameValue, Regret, RunMetrics, dissipation_margin
 from ..optima import Ideal
 from ..policies import CONTENDERS
 from ..records import KIND as CLAIRVOYANT
 from ..scenario import Scenario
-from ..theory import Condition, Theory, check, run_conditions, theory
+from ..theory import Condition, Theory, run_conditions, scenario_conditions, theory
 from .analysis import Field, analysis_record, ideal_of
 from .compared_runs import OPTIMUM, POLICIES, Optimum, Tell, make_all, record_path
 from .excitation import ExcitationRun, excitation_runs
@@ -122,14 +121,14 @@ class Comparison:
         }
 
     @property
-    def regret(self) -> dict[str, dict[str, Any]] | None:
-        """For each policy median, p90, max and the number that diverged.
+    def regret(self) -> dict[str, Regret] | None:
+        """The distribution over the states for each policy, a run that ended early as infinite.
 
         None in `disturbed` mode without a clairvoyant optimum: the game's is no reference there.
         """
         if self.disturbed and (self.clairvoyant is None or not self.clairvoyant_optima[0].value):
             return None
-        return {name: distribution(regrets) for name, regrets in self.regrets.items()}
+        return {name: Regret.of(regrets) for name, regrets in self.regrets.items()}
 
     @property
     def too_short(self) -> list[str]:
@@ -216,7 +215,7 @@ def _conditions(
     scenario: Scenario, learned: xr.Dataset, ideal: Ideal | None, watched: Theory | None
 ) -> list[Condition]:
     bounds = None if ideal is None else ideal.bounds
-    listed = check(scenario, bounds, float(learned["rank_margin"].min()))
+    listed = scenario_conditions(scenario, bounds, float(learned["rank_margin"].min()))
     return listed + run_conditions(scenario, learned, watched)
 
 

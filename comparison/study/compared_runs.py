@@ -11,7 +11,7 @@ import xarray as xr
 
 from ...offline import OfflineSolver
 from ...symbolic import RunError
-from ..merit import RunMetrics, run_metrics
+from ..merit import RunMetrics, regret, run_metrics
 from ..parallel import Work, run_tasks
 from ..records import KIND as CLAIRVOYANT
 from ..records import clairvoyant_record, contender_record, optimal_record
@@ -128,6 +128,4 @@ def _optimum(make: Callable[[], xr.Dataset]) -> Optimum:
 
 def _regretted(run: RunMetrics, optimum: float | None, disturbed: bool) -> RunMetrics:
     cost = run.running_cost if disturbed else run.cost
-    if cost is None or not optimum:
-        return run
-    return replace(run, regret=(cost - optimum) / optimum)
+    return replace(run, regret=regret(cost, optimum))

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from ...online import load
 from ...online.records import read_parts, remove_temporaries, versions, written_whole
 from ...symbolic import InputError
-from ...symbolic.underwater import STATE_NAMES
 from ..parallel import Event, Work
 from .sweep_plan import Plan, Run
 from .sweep_run import FIGURES, Bench, Finished, lost_row, worker
@@ -149,8 +148,9 @@ class Sweep:
             columns[one.key] = "" if numbers else None
         columns |= {one.key: "" for one in self.plan.ranges}
         columns |= {"state": "1", "seed": "1"}
-        units = ("m", "m", "m", "rad", "rad", "rad", "m/s", "m/s", "m/s", "rad/s", "rad/s", "rad/s")
-        columns |= {f"initial_{name}": unit for name, unit in zip(STATE_NAMES, units, strict=True)}
+        problem = self.plan.scenario.setup().problem
+        states = zip(problem.state_names, problem.state_units, strict=True)
+        columns |= {f"initial_{name}": unit for name, unit in states}
         return columns | FIGURES | {"failed": "1", "reason": None, "record": None}
 
     def _keep(self, run: Run, row: dict[str, Any], record: bytes | None, lost: bool = False) -> None:

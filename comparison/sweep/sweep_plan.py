@@ -21,13 +21,14 @@ from ...online import draw_samples
 from ...online.records import versions
 from ...symbolic import InputError
 from ...symbolic.arrays import Array
+from ...symbolic.pyfile import file_content, is_named
 from ..policies import contender
-from ..records import FORMAT
+from ..records import FORMAT, model_text
 from ..scenario import Scenario
 from .vary import Choices, Range, varied
 
 Sampling = Literal["random", "latin", "sobol"]
-FILES = ("vehicle", "simulation.plant", "basis.name", "learner.weights")
+FILES = ("vehicle", "problem", "simulation.plant", "basis.name", "learner.weights")
 
 
 def sampled(n_points: int, dimension: int, sampling: Sampling, seed: int) -> Array:
@@ -55,7 +56,7 @@ class Run:
     policy : name of the contender
     state : its initial state's number among those from the same settings, from 0
     settings : what differs from the scenario
-    zeta : (12,) initial state; None for the scenario's
+    zeta : (n,) initial state; None for the scenario's
     """
 
     number: int
@@ -84,7 +85,7 @@ class Plan:
     varied : settings that take values or are sampled
     n_points : points at which the ranges are sampled
     sampling : how
-    states : (N, 12) initial states, or how many are drawn, s x half-widths x U(-1, 1)^12 x U(0.1, 1)
+    states : (N, n) initial states, or how many are drawn, s x half-widths x U(-1, 1)^n x U(0.1, 1)
         with the envelope of the run; 0 for the scenario's own
     seed : of points and states
     kept : what else the results depend on
@@ -174,7 +175,9 @@ class Plan:
         @lru_cache(maxsize=4)
         def drawn(envelope: str, n_states: int) -> Array:
             settings = varied(self.scenario, json.loads(envelope)).envelope
-            half_widths = settings.scale * np.array(settings.half_widths)
+            given = settings.half_widths
+            widths = self.scenario.setup().half_widths if given is None else np.array(given)
+            half_widths = settings.scale * widths
             return draw_samples(half_widths, n_states, self.seed)
 
         return drawn
@@ -182,6 +185,8 @@ class Plan:
     def _key(self, policy: str, settings: dict[str, Any], zeta: tuple[float, ...] | None) -> str:
         named = {name: settings[name] for name in FILES if name in settings}
         parts = [self._sources(json.dumps(named)), policy, json.dumps([settings, zeta], sort_keys=True)]
+        if is_named(policy):
+            parts.append(file_content(policy))
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:24]
 
     @cached_property
@@ -192,7 +197,9 @@ class Plan:
             one = varied(self.scenario, json.loads(named))
             driven = one.plant_vehicle()
             parts = [str(FORMAT), repr(sorted(versions().items())), self.kept]
-            parts += [self.scenario.model_dump_json(), one.model_vehicle().model_dump_json()]
+            vehicle = one.problem is None
+            model = one.model_vehicle().model_dump_json() if vehicle else model_text(one.setup())
+            parts += [self.scenario.model_dump_json(), model]
             parts += ["" if driven is None else driven.model_dump_json(), *one.file_contents()]
             return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 

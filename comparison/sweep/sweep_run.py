@@ -12,9 +12,8 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
-from ...symbolic import RunError, StationkeepError, StationKeeping
+from ...symbolic import RunError, Setup, StationkeepError
 from ...symbolic.arrays import Array
-from ...symbolic.underwater import STATE_NAMES
 from ..merit import GameValue, dissipation_margin, run_metrics
 from ..parallel import Work
 from ..records import contender_record
@@ -23,7 +22,7 @@ from .sweep_plan import Run
 
 Records = Literal["all", "failed", "none"]
 LEARNING = 10  # the weights are kept that much more rarely than the motion
-N_STATIONS = 4  # built ones that a worker remembers
+N_SETUPS = 4  # built ones that a worker remembers
 # what a setting can make of a run; anything else is a fault of the program
 FAULTS = (StationkeepError, ArithmeticError, ValueError, RuntimeError, MemoryError)
 FIGURES: dict[str, str] = {
@@ -83,11 +82,11 @@ class Finished:
 
 def worker(bench: Bench) -> Work[Run, Finished]:
     """Return what makes a run, for `pool.run_tasks`."""
-    stations = _Stations()
+    setups = _Setups()
 
     def work(run: Run) -> Iterator[Finished]:
         with np.errstate(all="ignore"):  # a run that diverges says so in its row
-            finished = _finished(bench, stations, run)
+            finished = _finished(bench, setups, run)
         yield finished
 
     return work
@@ -95,56 +94,43 @@ def worker(bench: Bench) -> Work[Run, Finished]:
 
 def lost_row(run: Run, scenario: Scenario, reason: str) -> dict[str, Any]:
     """Return the row of a run that gave no figures, and why."""
-    zeta = scenario.simulation.initial_state if run.zeta is None else run.zeta
-    states = {f"initial_{name}": value for name, value in zip(STATE_NAMES, zeta, strict=True)}
+    zeta = scenario.initial_state.tolist() if run.zeta is None else run.zeta
+    names = scenario.setup().problem.state_names
+    states = {f"initial_{name}": value for name, value in zip(names, zeta, strict=True)}
     head = {"run": run.number, "policy": run.policy, "state": run.state}
     row: dict[str, Any] = head | run.settings | states
     return row | dict.fromkeys(FIGURES) | {"failed": True, "reason": reason}
 
 
-class _Stations:
-    """The last stations that were built, each with the values that were found."""
+class _Setups:
+    """The last setups that were built, each with what finds V* there and remembers the last one."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[str, tuple[StationKeeping, _Values]] = OrderedDict()
+        self._known: OrderedDict[str, tuple[Setup, GameValue]] = OrderedDict()
 
-    def of(self, scenario: Scenario) -> tuple[StationKeeping, _Values]:
-        """Return the scenario's station, built once, and give it to the scenario."""
-        text = scenario.station_text()
+    def of(self, scenario: Scenario) -> tuple[Setup, GameValue]:
+        """Return the scenario's setup, built once, and give it to the scenario."""
+        text = scenario.setup_text()
         if text not in self._known:
-            station = scenario.station_keeping()
-            self._known[text] = station, _Values(station)
-            if len(self._known) > N_STATIONS:
+            setup = scenario.setup()
+            self._known[text] = setup, GameValue(setup)
+            if len(self._known) > N_SETUPS:
                 self._known.popitem(last=False)
         self._known.move_to_end(text)
-        station, values = self._known[text]
-        scenario.use_station(station)
-        return station, values
+        setup, value = self._known[text]
+        scenario.use_setup(setup)
+        return setup, value
 
 
-class _Values:
-    """V* at states; the last one is remembered, since every policy starts there."""
-
-    def __init__(self, station: StationKeeping) -> None:
-        self._value = GameValue(station)
-        self._last: tuple[bytes, float] | None = None
-
-    def at(self, zeta: Array) -> float:
-        """Return V*(ζ); raises RunError where the solver does not converge."""
-        if self._last is None or self._last[0] != zeta.tobytes():
-            self._last = zeta.tobytes(), self._value(zeta)
-        return self._last[1]
-
-
-def _finished(bench: Bench, stations: _Stations, run: Run) -> Finished:
+def _finished(bench: Bench, setups: _Setups, run: Run) -> Finished:
     started = time.perf_counter()
     row, record = lost_row(run, bench.scenario, ""), None
     try:
         scenario = run.scenario(bench.scenario)
         row |= lost_row(run, scenario, "")
-        station, values = stations.of(scenario)
+        setup, value = setups.of(scenario)
         record = contender_record(scenario, run.policy)
-        row |= _figures(record, station, values)
+        row |= _figures(record, setup, value)
     except FAULTS as error:
         row["reason"] = " ".join(str(error).split()) or type(error).__name__
     row["failed"] = bool(row["reason"])
@@ -157,25 +143,23 @@ def _finished(bench: Bench, stations: _Stations, run: Run) -> Finished:
     return Finished(run, row, bytes(small.to_netcdf(engine="h5netcdf")))
 
 
-def _figures(record: xr.Dataset, station: StationKeeping, values: _Values) -> dict[str, Any]:
+def _figures(record: xr.Dataset, setup: Setup, value: GameValue) -> dict[str, Any]:
     zeta, fallback = record["zeta"].values, record["fallback"].values
     time_axis = record["time"].values
     row: dict[str, Any] = {"reason": str(record.attrs["stopped"])}
     disturbed = record.attrs["mode"] == "disturbed"
     if not disturbed and len(zeta):
         try:
-            row["optimum"] = values.at(zeta[0])
+            row["optimum"] = value(zeta[0])
         except RunError as error:
             row["reason"] = row["reason"] or f"the optimum is not known: {error}"
-    found = vars(run_metrics(record, station, row.get("optimum")))
+    found = vars(run_metrics(record, setup, row.get("optimum")))
     row |= {name: found[name] for name in FIGURES if name in found}
     row["fallback"] = float(fallback.mean()) if len(fallback) else None
     row["ended"] = float(time_axis[-1]) if len(time_axis) else None
     if disturbed and len(zeta) and not row["reason"]:
         try:
-            row["dissipation_margin"] = dissipation_margin(
-                record, values.at(zeta[0]), values.at(zeta[-1])
-            )
+            row["dissipation_margin"] = dissipation_margin(record, value(zeta[0]), value(zeta[-1]))
         except RunError as error:
             row["reason"] = f"the optimum is not known: {error}"
     return row

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..merit import distribution
+from ..merit import QUANTILES, Regret
 
 FIGURES = ("regret", "position_rms", "energy", "policy_mean")
 REFERENCE = "linear"
@@ -21,31 +22,37 @@ class _Group:
         self.n = 0
         self.failed = 0
         self.too_short = 0
+        self.with_optimum = 0
         self.figures = {name: array("d") for name in FIGURES}
 
     def add(self, row: Mapping[str, Any]) -> None:
         """Count a row; of one that failed there are no figures."""
         self.n += 1
+        self.with_optimum += row.get("optimum") is not None
         self.failed += bool(row["failed"])
         self.too_short += not row["failed"] and (row["rest_share"] or 0.0) > TOO_SHORT
         for name, values in self.figures.items():
             if not row["failed"] and row[name] is not None:
                 values.append(row[name])
 
+    @property
+    def regret(self) -> Regret:
+        """Of the runs that have one, and of those that failed, where any has an optimum."""
+        found = self.figures["regret"]
+        return Regret.of([*found, *[None] * self.failed] if found or self.with_optimum else [])
+
     def told(self) -> dict[str, Any]:
         """Return numbers of runs and of failed ones, the regret's distribution and other medians."""
-        regret = distribution([*self.figures["regret"]])
         medians = {
             name: float(np.median(values)) if values else None
             for name, values in self.figures.items()
             if name != "regret"
         }
-        shown = {name: regret[name] for name in ("median", "p90", "max")}
         return {
             "n": self.n,
             "failed": self.failed,
             "too_short": self.too_short,
-            "regret": shown,
+            "regret": self.regret.as_json(),
             **medians,
         }
 
@@ -53,27 +60,28 @@ class _Group:
 def summary(rows: Iterable[Mapping[str, Any]], settings: Sequence[str]) -> list[dict[str, Any]]:
     """Return one entry for each policy and each choice of `settings`, in the order of the rows.
 
-    Each has the policy and the settings, `n`, `failed` and `too_short`; of the runs that did not fail
-    the `regret` (median, p90, max) and the medians of position_rms, energy and policy_mean; and where
-    the linear policy takes part `of_linear`, the three regrets over its own.
+    Each has the policy and the settings, `n`, `failed` and `too_short`; the `regret` (`Regret.as_json`,
+    runs that failed as infinite); of those that did not fail the medians of position_rms, energy and
+    policy_mean; and where the linear policy takes part `of_linear`, the three regrets over its own,
+    None where one of the two is infinite.
     """
     groups: dict[str, _Group] = {}
     for row in rows:
         name = json.dumps([[row[key] for key in settings], row["policy"]])
         groups.setdefault(name, _Group()).add(row)
-    told = {name: group.told() for name, group in groups.items()}
     found = []
-    for name, entry in told.items():
+    for name, group in groups.items():
         values, policy = json.loads(name)
-        reference = told.get(json.dumps([values, REFERENCE]))
-        of_linear = _ratio(entry["regret"], reference["regret"]) if reference else None
+        reference = groups.get(json.dumps([values, REFERENCE]))
+        of_linear = _ratio(group.regret, reference.regret) if reference else None
         head = {"policy": policy, "settings": dict(zip(settings, values, strict=True))}
-        found.append(head | entry | {"of_linear": of_linear})
+        found.append(head | group.told() | {"of_linear": of_linear})
     return found
 
 
-def _ratio(one: dict[str, float | None], other: dict[str, float | None]) -> dict[str, float | None]:
+def _ratio(one: Regret, other: Regret) -> dict[str, float | None]:
+    pairs = {name: (getattr(one, name), getattr(other, name)) for name in QUANTILES}
     return {
-        name: None if value is None or not other[name] else value / float(other[name] or 1.0)
-        for name, value in one.items()
+        name: value / reference if math.isfinite(value) and 0.0 != reference < math.inf else None
+        for name, (value, reference) in pairs.items()
     }

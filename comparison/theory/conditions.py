@@ -6,139 +6,66 @@ has the value None and says so; where a part of its bound is known, the bound is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import minimize
 
+from ...offline import Plant
 from ...online import Learner, draw_samples, rank_margin
-from ...online.rows import regressor_spectrum
-from ...online.vehicle import fixed_points
-from ...symbolic import StationKeeping
+from ...online.loop import fixed_points
+from ...online.paper import regressor_spectrum
+from ...symbolic import Setup, StationKeeping
 from ...symbolic.arrays import Array
 from ..optima import Bounds
 from ..scenario import Scenario
+from .condition import Condition
+from .problem_conditions import domain_conditions, equilibrium
+from .vehicle_conditions import vehicle_conditions, vehicle_equilibrium
 
 NO_EPSILON = "needs sup|ε'| of Assumption 3: give --ideal-weights"
 
 
-@dataclass(frozen=True)
-class Condition:
-    """One line of `check`.
-
-    Attributes
-    ----------
-    name : what must hold
-    paper : where the paper says so
-    value, bound : the two sides; None if not known
-    holds : None if it can't be decided
-    note : what the numbers are, and what is missing
-    """
-
-    name: str
-    paper: str
-    value: float | None
-    bound: float | None
-    holds: bool | None
-    note: str
-
-
-def check(
+def scenario_conditions(
     scenario: Scenario, bounds: Bounds | None = None, c_lower: float | None = None
 ) -> list[Condition]:
     """Return every assumption and condition of the paper with its value for the scenario.
 
     Parameters
     ----------
-    bounds : on ε and ε', from ideal weights, see `comparison.ideal.load_ideal`
+    bounds : on ε and ε', from ideal weights, see `optima.load_ideal`
     c_lower : infimum over a run of (18)'s λ_min; that at the initial weights if None
     """
-    station = scenario.station_keeping()
+    setup = scenario.station_keeping()
     learner = Learner(
-        station.problem,
-        station.basis,
+        setup.problem,
+        setup.basis,
         scenario.learner.model_copy(update={"error": "bellman", "safeguard": False}),
-        fixed_points(scenario.samples, station),
-        station.riccati_weights,
+        fixed_points(scenario.samples, setup),
+        setup.riccati_weights,
         scenario.initial_weights(),
-        station.functions,
+        setup.functions,
     )
     residual = learner.sample_residual()
     margin = 0.0 if residual is None else rank_margin(residual.omega)
     margin = margin if c_lower is None else min(margin, c_lower)
     return [
-        _pitch(scenario),
-        *_inertia(scenario, station),
-        _equilibrium(station),
-        _representation(bounds),
+        *_own(scenario, setup),
+        _representation(bounds, setup.problem.n_states),
         *_samples(scenario, learner),
-        *_gains(scenario, station, margin, bounds),
-        *_attenuation(station),
+        *_gains(scenario, setup, margin, bounds),
+        *_attenuation(setup),
     ]
 
 
-def _pitch(scenario: Scenario) -> Condition:
-    limit = scenario.simulation.pitch_limit
-    return Condition(
-        "pitch stays away from ±90 deg",
-        "Assumption 1",
-        limit,
-        90.0,
-        limit < 90.0,
-        "deg; a run ends when |pitch| exceeds the limit",
-    )
+def _own(scenario: Scenario, setup: Setup) -> list[Condition]:
+    """Return what is asked of the problem itself: a vehicle's attitude and inertia, or the domain."""
+    if isinstance(setup, StationKeeping):
+        limit = scenario.simulation.pitch_limit
+        return [*vehicle_conditions(setup, limit), vehicle_equilibrium(setup)]
+    return [*domain_conditions(setup), equilibrium(setup)]
 
 
-def _inertia(scenario: Scenario, station: StationKeeping) -> list[Condition]:
-    low, high = inertia_bounds(station, np.radians(scenario.simulation.pitch_limit))
-    where = f"over |pitch| <= {scenario.simulation.pitch_limit:g} deg and all rolls"
-    return [
-        Condition(
-            "M_bar >= m_lower > 0",
-            "Property 1",
-            low,
-            0.0,
-            low > 0.0,
-            f"smallest eigenvalue of M_bar {where}; not constant as printed: 0 at 90 deg",
-        ),
-        Condition(
-            "M_bar <= m_upper",
-            "Property 1",
-            high,
-            None,
-            bool(np.isfinite(high)),
-            f"largest eigenvalue of M_bar {where}; |g| <= 1/m_lower = {1.0 / low:.3g} there",
-        ),
-    ]
-
-
-def inertia_bounds(station: StationKeeping, pitch_limit: float) -> tuple[float, float]:
-    """Return the least and largest eigenvalue of M_bar over |θ| <= pitch_limit [rad] and all rolls.
-
-    On a grid of 61 pitches and 48 rolls; M_bar turns with the yaw, which leaves its eigenvalues alone.
-    """
-    kernel = station.model.earth_frame
-    low, high = np.inf, 0.0
-    zeta = np.zeros(12)
-    for theta in np.linspace(-pitch_limit, pitch_limit, 61):
-        for phi in np.linspace(-np.pi, np.pi, 48, endpoint=False):
-            zeta[3:5] = phi, theta
-            eigenvalues = np.linalg.eigvalsh(kernel(zeta)[0])
-            low, high = min(low, float(eigenvalues[0])), max(high, float(eigenvalues[-1]))
-    return low, high
-
-
-def _equilibrium(station: StationKeeping) -> Condition:
-    residual = float(np.linalg.norm(station.model.drift(np.zeros(12))))
-    trim = np.array2string(station.model.u_trim, precision=3, suppress_small=True)
-    note = "|f(0)|; neutrally buoyant, upright at rest"
-    if residual >= 1e-9:
-        note = f"|f(0)|; the steady trim u_trim = {trim} N, N m is fed forward and taken out of f"
-    return Condition("f(0) = 0", "Assumption 2", residual, 0.0, residual < 1e-9, note)
-
-
-def _representation(bounds: Bounds | None) -> Condition:
-    smooth = "σ is smooth, so bounded on χ, though not on R^12 as printed; "
+def _representation(bounds: Bounds | None, n: int) -> Condition:
+    smooth = f"σ is smooth, so bounded on χ, though not on R^{n} as printed; "
     value, holds, numbers = None, None, "sup|ε| and sup|ε'|: give --ideal-weights"
     if bounds is not None:
         value, holds = bounds.epsilon, True
@@ -189,16 +116,14 @@ def _samples(scenario: Scenario, learner: Learner) -> list[Condition]:
     ]
 
 
-def _gains(
-    scenario: Scenario, station: StationKeeping, margin: float, bounds: Bounds | None
-) -> list[Condition]:
+def _gains(scenario: Scenario, setup: Setup, margin: float, bounds: Bounds | None) -> list[Condition]:
     """(24) and (25) share a free ε > 0: (24) is looked at with the least that (25) admits, and back."""
     settings = scenario.learner
-    lipschitz = drift_bound(station, max(scenario.samples.number, 500))
+    lipschitz = drift_bound(setup, max(scenario.samples.number, 500))
     gain = settings.gain_critic
     actors = settings.gain_actor_1 + settings.gain_actor_2
     known = actors / (2.0 * gain) if gain > 0.0 else np.inf
-    q_lower = float(np.linalg.eigvalsh(station.game.Q).min())
+    q_lower = float(np.linalg.eigvalsh(setup.game.Q).min())
     fails = margin <= known
     first, second, holds = None, known, False if fails else None
     first_note = NO_EPSILON
@@ -235,31 +160,36 @@ def _gains(
     ]
 
 
-def drift_bound(station: StationKeeping, n_points: int, seed: int = 0) -> float:
+def drift_bound(setup: Setup, n_points: int, seed: int = 0) -> float:
     """Return L_f = sup |f(ζ)| / |ζ| over the envelope, trim taken out.
 
     The largest of seeded points, and of local maxima that are climbed to from the best five of them.
     """
-    points = draw_samples(station.envelope, n_points, seed)
-    f = station.functions.at(points).f
+    points, plant = draw_samples(setup.envelope, n_points, seed), Plant(setup.problem)
+    f = setup.functions.at(points).f
     ratios = np.linalg.norm(f, axis=1) / np.linalg.norm(points, axis=1)
 
     def steepness(x: Array) -> float:
-        zeta = station.envelope * x
-        return -float(np.linalg.norm(station.model.drift(zeta)) / np.linalg.norm(zeta))
+        zeta = setup.envelope * x
+        return -float(np.linalg.norm(plant.terms(zeta)[0]) / np.linalg.norm(zeta))
 
     tops = [
-        minimize(steepness, points[i] / station.envelope, method="L-BFGS-B", bounds=[(-1.0, 1.0)] * 12)
+        minimize(
+            steepness,
+            points[i] / setup.envelope,
+            method="L-BFGS-B",
+            bounds=[(-1.0, 1.0)] * setup.problem.n_states,
+        )
         for i in np.argsort(-ratios)[:5]
     ]
     return float(max(ratios.max(), *(-top.fun for top in tops)))
 
 
-def _attenuation(station: StationKeeping) -> list[Condition]:
-    game = station.game
+def _attenuation(setup: Setup) -> list[Condition]:
+    game = setup.game
     least = float(np.linalg.eigvalsh(game.R).min())
     definite = float(np.linalg.eigvalsh(game.R_eff_inverse).min())
-    star = station.problem.gamma_star
+    star = setup.problem.gamma_star
     return [
         Condition(
             "λ_min(R) >= γ^2",

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...online.rows import BellmanTerms
+from ...online.paper import BellmanTerms
 from ...symbolic import InputError, ValueFunctions
 from ...symbolic.arrays import Array
 from .uub import Gains, largest_square

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from ..scenario import Scenario
-from .conditions import Condition
+from .condition import Condition
 from .theory import Theory
 from .uub import Constants
 

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from ...offline.ideal_weights import basis_at
-from ...online.vehicle import fixed_points
+from ...online.loop import fixed_points
 from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ..optima import Ideal
@@ -80,26 +80,26 @@ def require_run(record: xr.Dataset, name: str) -> None:
 
 
 def along(record: xr.Dataset) -> Array:
-    """Return ζ at the learning steps, shape (T, 12)."""
+    """Return ζ at the learning steps, shape (T, n)."""
     index = np.searchsorted(record["time"].values, record["learn_time"].values - 1e-9)
     return np.asarray(record["zeta"].values[np.minimum(index, record.sizes["time"] - 1)])
 
 
 def theory(scenario: Scenario, record: xr.Dataset, ideal: Ideal) -> Theory:
     """Return the theorem's quantities along a run of the scenario."""
-    station, learner = scenario.station_keeping(), scenario.learner
+    setup, learner = scenario.station_keeping(), scenario.learner
     zeta, W = along(record), ideal.weights
     errors = (
         W - record["critic"].values,
         W - record["actor_1"].values,
         W - record["actor_2"].values,
     )
-    value = basis_at(station.basis, zeta)[0] @ W
+    value = basis_at(setup.basis, zeta)[0] @ W
     pairs = ideal.pairs
     known = Knowledge(W, pairs.states, pairs.values, pairs.gradients)
-    drift = drift_bound(station, max(scenario.samples.number, 500))
-    suprema = measure(station.functions, known, fixed_points(scenario.samples, station), drift)
-    bound = learner.weight_bound * float(np.linalg.norm(station.riccati_weights))
+    drift = drift_bound(setup, max(scenario.samples.number, 500))
+    suprema = measure(setup.functions, known, fixed_points(scenario.samples, setup), drift)
+    bound = learner.weight_bound * float(np.linalg.norm(setup.riccati_weights))
     ball = float(np.linalg.norm(W)) + 1.1 * bound
     gains = Gains(learner.gain_critic, learner.gain_actor_1, learner.gain_actor_2)
     c_lower = float(record["rank_margin"].min())

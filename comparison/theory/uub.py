@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...online.rows import BellmanTerms, bellman_error
+from ...online.paper import BellmanTerms, bellman_error
 from ...symbolic import Game, ValueFunctions
 from ...symbolic.arrays import Array
 

@@ -1,6 +1,6 @@
 """The laws (19)-(21): critic and actors, exact over a step with frozen rows."""
 
-from .actor import Projection, actor_step
+from .actor import actor_step
 from .critic import (
     Equations,
     LeastSquares,
@@ -17,7 +17,6 @@ __all__ = [
     "LeastSquares",
     "NormalEquations",
     "Normalizer",
-    "Projection",
     "actor_step",
     "exact_flow",
     "gradient_step",

@@ -23,6 +23,7 @@ import scipy.linalg
 from scipy.linalg import lapack
 
 from ...symbolic.arrays import Array
+from ..paper import normalizer
 from .vector_code import largest_covariance
 
 Normalizer = Literal["paper", "squared", "state_cost"]
@@ -38,8 +39,8 @@ def row_weights(kind: Normalizer, omega: Array, state_cost: Array, floor: float)
     """
     if kind == "state_cost":
         return np.asarray((state_cost + floor) ** -2)
-    normalizer = 1.0 + np.sum(omega * omega, axis=1)
-    return np.asarray(normalizer**-0.5 if kind == "paper" else 1.0 / normalizer)
+    p = normalizer(omega)
+    return np.asarray(1.0 / p if kind == "paper" else p**-2)
 
 
 class Equations(Protocol):

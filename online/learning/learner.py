@@ -12,27 +12,24 @@ from ..laws import (
     Equations,
     LeastSquares,
     NormalEquations,
-    Projection,
     actor_step,
     gradient_step,
     library,
     row_weights,
 )
+from ..paper import BellmanTerms, Projection, Residual, bellman_error, value
 from ..rows import (
     BellmanSource,
-    BellmanTerms,
     CostateSource,
     FixedSamples,
     PathRows,
     RelativeTo,
-    Residual,
     RowGains,
     RowSource,
     SampleRows,
     SampleStrategy,
     VectorRows,
     Weights,
-    bellman_error,
 )
 from .learner_step import LearnerStep
 from .memory import Memory
@@ -174,7 +171,7 @@ class Learner:
 
     def value(self, zeta: Array) -> float:
         """Return V_hat(ζ) = Ŵ_c'σ(ζ) (13)."""
-        return float(self.critic @ self.functions.sigma(zeta)[0])
+        return float(value(self.functions.sigma(zeta)[0], self.critic))
 
     def predicted_cost(self, zeta: Array, actor_1: Array, actor_2: Array) -> float:
         """Return J from ζ (n,) under these actor weights, infinite if they lose the vehicle."""

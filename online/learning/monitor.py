@@ -14,7 +14,7 @@ import numpy as np
 
 from ...symbolic.arrays import Array
 from ..laws import Equations
-from ..rows import BellmanTerms, Residual, bellman_error, regressor_spectrum
+from ..paper import BellmanTerms, Residual, bellman_error, regressor_spectrum
 from .learner import Learner
 from .learner_step import LearnerStep
 

@@ -22,7 +22,8 @@ import numpy as np
 
 from ...symbolic import Game, RunError
 from ...symbolic.arrays import Array
-from ..rows import BellmanTerms, PathRows, bellman_error
+from ..paper import BellmanTerms, bellman_error
+from ..rows import PathRows
 
 Rows = tuple[Array, Array, Array]  # ω (N, m), r (N,), w (N,)
 RowsUnder = Callable[[Array], Rows | None]

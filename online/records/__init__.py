@@ -1,10 +1,10 @@
 """The record of a run, and files that are written whole."""
 
 from .files import load, read_parts, remove_temporaries, save, versions, write_text, written_whole
-from .record import FORCE_NAMES, load_weights, to_dataset
+from .record import listed, load_weights, to_dataset
 
 __all__ = [
-    "FORCE_NAMES",
+    "listed",
     "load",
     "load_weights",
     "read_parts",

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ...symbolic import InputError
+from ...symbolic import InputError, Problem
 from ...symbolic.arrays import Array
-from ...symbolic.underwater import STATE_NAMES
 from ..learning import Look
-from ..vehicle import History
+from ..loop import History
+from ..vehicle import VehicleHistory
 from .files import load, versions
 
 PLAYERS = ("control", "disturbance")
-FORCE_NAMES = ("X", "Y", "Z", "K", "M", "N")
-OVER_TIME = ("time", "zeta", "tau_b", "u_control", "disturbance", "cost", "attenuated")
+OVER_TIME = ("time", "zeta", "u_control", "disturbance", "cost", "attenuated")
 OVER_LEARNING = (
     *("learn_time", "bellman_error", "sample_error", "projecting"),
     *("predicted_cost", "accepted", "fallback", "linear"),
     *("critic", "actor_1", "actor_2"),
 )
-_STATE_UNITS = "m, rad, m/s, rad/s"
-_FORCE_UNITS = "N, N m"
 
 
 def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
@@ -33,15 +30,15 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
 
     Dimensions: `time` (control steps), `learn_time` (learning steps, each with the weights before it,
     and the end of the run), `look_time` (looks of the monitor), `player` (control, disturbance),
-    `state`, `force`, `basis`, and with thruster limits `thruster`. `tau_b` is the wrench that the
-    vehicle got; `disturbance_estimate` is there with an observer. Attributes: `saturated`, the share of
-    the control steps at which the least-norm thrusts exceeded a limit; median and mean wall time of a
-    policy's step [us].
+    `state`, `input`, `basis`, and for a vehicle `force` and with thruster limits `thruster`. `tau_b` is
+    the wrench that the vehicle got; `disturbance_estimate` is there with an observer. Attributes:
+    `saturated`, the share of the control steps at which the least-norm thrusts exceeded a limit; median
+    and mean wall time of a policy's step [us].
     """
-    m = len(history.critic[0]) if history.critic else 0
+    problem, m = history.problem, len(history.critic[0]) if history.critic else 0
 
     # an interrupt may have come between two appends
-    n_time = min(len(getattr(history, name)) for name in OVER_TIME)
+    n_time = _n_time(history)
     n_learn = min(len(getattr(history, name)) for name in OVER_LEARNING)
 
     def stack(name: str, width: int) -> Array:
@@ -52,13 +49,13 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
         n = n_time if name in OVER_TIME else n_learn
         return np.array(getattr(history, name)[:n], dtype=float)
 
-    variables = _variables(stack, series, m) | _looks(history.looks)
+    variables = _variables(problem, stack, series, m) | _looks(history.looks)
     coordinates = {
         "time": ("time", series("time"), {"units": "s"}),
         "learn_time": ("learn_time", series("learn_time"), {"units": "s"}),
         "look_time": ("look_time", [look.time for look in history.looks], {"units": "s"}),
-        "state": list(STATE_NAMES),
-        "force": list(FORCE_NAMES),
+        "state": list(problem.state_names),
+        "input": list(problem.input_names),
         "player": list(PLAYERS),
     }
     data: dict[str, tuple[tuple[str, ...], Array, dict[str, str]]] = {
@@ -72,20 +69,35 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     }
     if history.remembered is not None:
         data["remembered"] = (("basis",), history.remembered, {"units": "cost"})
-    return _with_actuation(xr.Dataset(data, coordinates, attributes), history)
+    return _with_vehicle(xr.Dataset(data, coordinates, attributes), history)
+
+
+def _n_time(history: History) -> int:
+    """Return the number of control steps of which everything was recorded."""
+    return min(
+        len(getattr(history, name))
+        for name in (*OVER_TIME, *(("tau_b",) if isinstance(history, VehicleHistory) else ()))
+    )
+
+
+def listed(units: Sequence[str]) -> str:
+    """Return units in their order, each once."""
+    return ", ".join(dict.fromkeys(units))
 
 
 def _variables(
-    stack: Callable[[str, int], Array], series: Callable[[str], Array], m: int
+    problem: Problem, stack: Callable[[str, int], Array], series: Callable[[str], Array], m: int
 ) -> dict[str, tuple[tuple[str, ...], Array, str]]:
     """Return dimensions, values and unit of every variable."""
     over_time, over_learning = ("time",), ("learn_time",)
     weights = ("learn_time", "basis")
+    n, k, k_2 = problem.n_states, problem.n_inputs, len(problem.game.W_d)
+    units = listed(problem.input_units)
+    second = "input" if k_2 == k else "disturbance_input"
     return {
-        "zeta": ((*over_time, "state"), stack("zeta", 12), _STATE_UNITS),
-        "tau_b": ((*over_time, "force"), stack("tau_b", 6), _FORCE_UNITS),
-        "u_control": ((*over_time, "force"), stack("u_control", 6), _FORCE_UNITS),
-        "u_disturbance": ((*over_time, "force"), stack("disturbance", 6), _FORCE_UNITS),
+        "zeta": ((*over_time, "state"), stack("zeta", n), listed(problem.state_units)),
+        "u_control": ((*over_time, "input"), stack("u_control", k), units),
+        "u_disturbance": ((*over_time, second), stack("disturbance", k_2), units),
         "cost": (over_time, series("cost"), "cost"),
         "attenuated": (over_time, series("attenuated"), "cost"),
         "bellman_error": (over_learning, series("bellman_error"), "cost/s"),
@@ -118,18 +130,24 @@ def _looks(looks: list[Look]) -> dict[str, tuple[tuple[str, ...], Array, str]]:
     return variables
 
 
-def _with_actuation(record: xr.Dataset, history: History) -> xr.Dataset:
-    """Return the record with thrusts and the times of the policy."""
-    n_time = record.sizes["time"]
-    if history.thrust:
-        thrust = np.array(history.thrust[:n_time]).reshape(n_time, -1)
-        record["thrust"] = (("time", "thruster"), thrust, {"units": "N"})
-        record.attrs["saturated"] = float(np.mean(history.saturated))
-    if history.estimate:
-        estimate = np.array(history.estimate[:n_time])
-        record["disturbance_estimate"] = (("time", "force"), estimate, {"units": _FORCE_UNITS})
-    record.attrs["policy_microseconds"] = 1e6 * history.policy_median
-    record.attrs["policy_microseconds_mean"] = 1e6 * history.policy_mean
+def _with_vehicle(record: xr.Dataset, history: History) -> xr.Dataset:
+    """Return the record with the times of the policy, and with what only a vehicle has."""
+    if isinstance(history, VehicleHistory):
+        n_time, problem = record.sizes["time"], history.problem
+        units = {"units": listed(problem.input_units)}
+        tau_b = np.array(history.tau_b[:n_time]).reshape(n_time, problem.n_inputs)
+        record["tau_b"] = (("time", "force"), tau_b, units)
+        record = record.assign_coords(force=list(problem.input_names))
+        if history.thrust:
+            thrust = np.array(history.thrust[:n_time]).reshape(n_time, -1)
+            record["thrust"] = (("time", "thruster"), thrust, {"units": "N"})
+            record.attrs["saturated"] = float(np.mean(history.saturated))
+        if history.estimate:
+            estimate = np.array(history.estimate[:n_time])
+            record["disturbance_estimate"] = (("time", "force"), estimate, units)
+    seconds = history.policy_seconds or [0.0]
+    record.attrs["policy_microseconds"] = 1e6 * float(np.median(seconds))
+    record.attrs["policy_microseconds_mean"] = 1e6 * float(np.mean(seconds))
     return record
 
 

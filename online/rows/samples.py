@@ -1,4 +1,4 @@
-"""Sample points ζ_j and the rank condition (18) that replaces persistence of excitation."""
+"""Sample points ζ_j of the rank condition (18), which replaces persistence of excitation."""
 
 from __future__ import annotations
 
@@ -122,19 +122,3 @@ def around(centers: Array, half_widths: Array, spread: float, rng: np.random.Gen
     """Return a point near each center, ζ + spread max_i |x_i| half_widths U(-1, 1)^n, shape (N, n)."""
     reach = spread * local_scale(centers, half_widths)[:, None] * half_widths
     return np.asarray(centers + reach * rng.uniform(-1.0, 1.0, centers.shape))
-
-
-def regressor_spectrum(omega: Array) -> Array:
-    """Return the eigenvalues of Σ ω_j ω_j' / p_j of (18), p_j = sqrt(1 + ω_j'ω_j), ascending, (m,)."""
-    rows = omega * (1.0 + np.sum(omega * omega, axis=1, keepdims=True)) ** -0.25
-    return np.asarray(np.linalg.eigvalsh(rows.T @ rows))
-
-
-def rank_margin(omega: Array) -> float:
-    """Return λ_min(Σ ω_j ω_j' / p_j): (18) holds while it is positive.
-
-    `omega`: (N, m) regressors at the samples. Departs from the paper: (18) asks for the rank only; a
-    uniform lower bound (its c) needs the infimum of this over time, so `monitor` follows it.
-    """
-    n_samples, m = omega.shape
-    return 0.0 if n_samples < m else float(max(regressor_spectrum(omega)[0], 0.0))

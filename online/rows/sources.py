@@ -14,7 +14,7 @@ import numpy as np
 
 from ...symbolic import Path, Prediction
 from ...symbolic.arrays import Array
-from .bellman import BellmanTerms, Residual
+from ..paper import BellmanTerms, Residual
 from .samples import Predict, SampleStrategy, around
 
 VALUE_SHARE = 1e-2  # of a relative square error of the value, beside one of relative regret

@@ -1,6 +1,6 @@
 """The Bellman error's rows and the critic's sums in compiled vector code, `vector_rows.c`.
 
-It computes what `bellman.bellman_error`, `critic.row_weights` and `critic.NormalEquations` do in numpy,
+It computes what `paper.bellman_error`, `critic.row_weights` and `critic.NormalEquations` do in numpy,
 from σ' and g without their zeros, for the samples and the state at once. The gradient law's flow
 
     y_dot = -A y + b,  y(0) = 0,    A = η Σ w ω ω' + leash >= 0,    b = η Σ w ω δ

@@ -1,13 +1,13 @@
 """A vehicle in closed loop: controller, plant, disturbance, sensors and thrusters."""
 
 from .allocation import Allocation, Allocator
-from .controller import Controller, fixed_points
+from .controller import Controller
 from .disturbance import Disturbance, KnownSource, build_disturbance
-from .history import History
-from .loop import Policy, Progress, run
+from .history import VehicleHistory
+from .loop import VehiclePolicy, run
 from .noise import MeasurementNoise
 from .observer import DisturbanceObserver
-from .plant import HeldPlant, PlantState, held_rates
+from .plant import HeldPlant, held_rates
 from .settings import DisturbanceSettings, NoiseSettings, SimulationSettings
 
 __all__ = [
@@ -18,16 +18,13 @@ __all__ = [
     "DisturbanceObserver",
     "DisturbanceSettings",
     "HeldPlant",
-    "History",
     "KnownSource",
     "MeasurementNoise",
     "NoiseSettings",
-    "PlantState",
-    "Policy",
-    "Progress",
     "SimulationSettings",
+    "VehicleHistory",
+    "VehiclePolicy",
     "build_disturbance",
-    "fixed_points",
     "held_rates",
     "run",
 ]

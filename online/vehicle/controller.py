@@ -10,29 +10,15 @@ from numpy.typing import ArrayLike
 
 from ...symbolic import InputError, StationKeeping, require_pitch
 from ...symbolic.arrays import Array
-from ..learning import Learner, LearnerSettings, LearnerStep, SampleSettings
-from ..rows import FixedSamples, SampleStrategy, ShrinkingSamples, TrajectorySamples, draw_samples
+from ..learning import Learner, LearnerStep
+from ..loop import LearnedPolicy, LearnerScenario
 
 
-class ControllerScenario(Protocol):
+class ControllerScenario(LearnerScenario, Protocol):
     """What a controller needs of a scenario."""
-
-    @property
-    def learner(self) -> LearnerSettings:
-        """Settings of the actor-critic."""
-        ...
-
-    @property
-    def samples(self) -> SampleSettings:
-        """Settings of the sample points."""
-        ...
 
     def station_keeping(self) -> StationKeeping:
         """Return vehicle, game and basis."""
-        ...
-
-    def initial_weights(self) -> Array | None:
-        """Return the weights to start from, or None for weight_factor times the Riccati weights."""
         ...
 
 
@@ -49,10 +35,7 @@ class Controller:
 
     Attributes
     ----------
-    learner : the actor-critic
-    zeta : (12,) the last state: pose error and rates in the station's frame
-    u_control, u_disturbance : (6,) û_1 and û_2 there [N, N m]
-    last_step : what the last learning step saw
+    learned : the learner's policy in the station's frame
 
     Examples
     --------
@@ -81,28 +64,33 @@ class Controller:
                 "a known current can't be combined with a station heading other than 0; turn the "
                 "earth frame so that its x axis is the heading to hold, and the current with it"
             )
-        self.learn = learn
-        reference, weights = _start(scenario, self.setup)
-        self.learner = Learner(
-            self.setup.problem,
-            self.setup.basis,
-            scenario.learner,
-            sample_strategy(scenario.samples, self.setup) if learn else np.zeros((0, 12)),
-            reference,
-            weights,
-            self.setup.functions,
-            scenario.samples,
-            self.setup.envelope if learn and scenario.samples.remember else None,
-        )
-        # nothing to certify where the frozen weights are the reference's own
-        safeguarded = not learn and scenario.learner.safeguard
-        self.certify = safeguarded and weights is not None and weights is not reference
-        self.period = scenario.learner.period
-        self._since: float | None = None
-        self.last_step: LearnerStep | None = None
-        self.zeta, self._J = np.zeros(12), np.eye(6)
-        self.u_control = np.zeros(6)
-        self.u_disturbance = np.zeros(6)
+        self.learned = LearnedPolicy(scenario, learn=learn)
+        self._J = np.eye(6)
+
+    @property
+    def learner(self) -> Learner:
+        """The actor-critic."""
+        return self.learned.learner
+
+    @property
+    def last_step(self) -> LearnerStep | None:
+        """What the last learning step saw; None where the last step did not learn."""
+        return self.learned.last_step
+
+    @property
+    def zeta(self) -> Array:
+        """The last state, (12,): pose error and rates in the station's frame."""
+        return self.learned.zeta
+
+    @property
+    def u_control(self) -> Array:
+        """û_1 there, (6,) [N, N m]."""
+        return self.learned.u_control
+
+    @property
+    def u_disturbance(self) -> Array:
+        """û_2 there, (6,) [N, N m]."""
+        return self.learned.u_disturbance
 
     def step(self, eta: ArrayLike, eta_dot: ArrayLike, dt: float) -> Array:
         """Return the body wrench τ_b = J'(û_1 + u_trim) to hold for the next dt, shape (6,) [N, N m].
@@ -134,19 +122,10 @@ class Controller:
         if not np.isfinite(measured).all():
             raise InputError("eta and eta_dot must be finite, but contain NaN or infinity")
         require_pitch(pose[4])
-        self.zeta = self._error(measured)
-        (self._J,) = self.setup.model.kinematics(self.zeta[:6])
-        self.last_step = None
-        since = self.period if self._since is None else self._since + dt
-        if self.learn and since >= self.period * (1.0 - 1e-9):
-            self.last_step = self.learner.step(self.zeta, since)
-            since = 0.0
-        elif self.certify and since >= self.period * (1.0 - 1e-9):
-            self.last_step = self.learner.certify(self.zeta)
-            since = 0.0
-        self._since = since
-        self.u_control, self.u_disturbance = self.learner.policies(self.zeta)
-        return self.body_wrench(self.u_control + self.setup.model.u_trim)
+        zeta = self._error(measured)
+        (self._J,) = self.setup.model.kinematics(zeta[:6])
+        u_control = self.learned.step(zeta, dt)
+        return self.body_wrench(u_control + self.setup.model.u_trim)
 
     def body_wrench(self, u: Array) -> Array:
         """Return τ = J(η)'u of an earth-frame force u at the last state, shape (6,)."""
@@ -160,39 +139,3 @@ class Controller:
         zeta: Array = self._turn @ (measured - self._origin)
         zeta[5] = math.atan2(math.sin(zeta[5]), math.cos(zeta[5]))
         return zeta
-
-
-def _start(scenario: ControllerScenario, setup: StationKeeping) -> tuple[Array, Array | None]:
-    """Return the reference weights, and those to start from, or None for the settings' multiple."""
-    weights, settings = scenario.initial_weights(), scenario.learner
-    if settings.reference == "riccati":
-        return setup.riccati_weights, weights
-    start = setup.riccati_weights * settings.weight_factor if weights is None else weights
-    if not np.any(start):
-        raise InputError(
-            "learner.reference is 'initial', but the initial weights are zero, which leaves the "
-            'projection a ball without points; set learner.reference = "riccati" or start elsewhere'
-        )
-    return start, start
-
-
-def sample_strategy(settings: SampleSettings, setup: StationKeeping) -> SampleStrategy:
-    """Return the strategy that the settings name."""
-    if settings.strategy == "trajectory":
-        return TrajectorySamples(
-            setup.half_widths,
-            settings.number,
-            settings.seed,
-            spread=settings.spread,
-            ahead=settings.ahead,
-        )
-    if settings.strategy == "shrinking":
-        box, inner = setup.half_widths, settings.inner
-        points = draw_samples(box, settings.number, settings.seed, inner=inner)
-        return ShrinkingSamples(points, box, settings.spread)
-    return FixedSamples(fixed_points(settings, setup))
-
-
-def fixed_points(settings: SampleSettings, setup: StationKeeping) -> Array:
-    """Return the fixed ζ_j of (18), in the envelope, whatever the strategy, shape (N, 12)."""
-    return draw_samples(setup.envelope, settings.number, settings.seed, inner=settings.inner)

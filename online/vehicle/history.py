@@ -1,42 +1,26 @@
-"""What a closed-loop run leaves behind, as it grows."""
+"""What a vehicle's closed-loop run leaves behind."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 from ...symbolic.arrays import Array
-from ..learning import Look
+from ..loop import History
 
 
 @dataclass
-class History:
-    """Lists that grow with the run; `record.to_dataset` names and stacks them."""
+class VehicleHistory(History):
+    """The lists of a run, and those that only a vehicle has.
 
-    time: list[float] = field(default_factory=list)
-    zeta: list[Array] = field(default_factory=list)
+    Attributes
+    ----------
+    tau_b : (6,) wrench that the vehicle got [N, N m]
+    thrust : (n_thrusters,) [N], with thruster limits
+    saturated : whether the least-norm thrusts exceeded a limit
+    estimate : (6,) what the disturbance observer says, with an observer [N, N m]
+    """
+
     tau_b: list[Array] = field(default_factory=list)
-    u_control: list[Array] = field(default_factory=list)
-    disturbance: list[Array] = field(default_factory=list)
-    cost: list[float] = field(default_factory=list)
-    attenuated: list[float] = field(default_factory=list)
     thrust: list[Array] = field(default_factory=list)
     saturated: list[bool] = field(default_factory=list)
     estimate: list[Array] = field(default_factory=list)
-    learn_time: list[float] = field(default_factory=list)
-    bellman_error: list[float] = field(default_factory=list)
-    sample_error: list[float] = field(default_factory=list)
-    projecting: list[bool] = field(default_factory=list)
-    predicted_cost: list[float] = field(default_factory=list)
-    accepted: list[float] = field(default_factory=list)
-    fallback: list[bool] = field(default_factory=list)
-    linear: list[bool] = field(default_factory=list)
-    critic: list[Array] = field(default_factory=list)
-    actor_1: list[Array] = field(default_factory=list)
-    actor_2: list[Array] = field(default_factory=list)
-    looks: list[Look] = field(default_factory=list)
-    remembered: Array | None = None
-    stopped: str | None = None
-    wall_seconds: float = 0.0
-    processor_seconds: float = 0.0
-    policy_median: float = 0.0
-    policy_mean: float = 0.0

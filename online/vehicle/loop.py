@@ -1,31 +1,27 @@
-"""One closed-loop run: controller, plant and disturbance, recorded until its end."""
+"""One closed-loop run of a vehicle: controller, plant and disturbance."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
-from ...symbolic import InputError, RunError, StationKeeping, Vehicle
+from ...symbolic import StationKeeping, Vehicle
 from ...symbolic.arrays import Array
-from ...symbolic.underwater import STATE_NAMES
-from ..learning import LearnerStep, Monitor
+from ..loop import LearnerScenario, PlantState, Progress, System, drive
 from .allocation import Allocator
-from .controller import Controller, ControllerScenario, fixed_points
+from .controller import Controller, ControllerScenario
 from .disturbance import DisturbanceSource, build_disturbance
-from .history import History
+from .history import VehicleHistory
 from .noise import MeasurementNoise
 from .observer import DisturbanceObserver
-from .plant import HeldPlant, PlantState
+from .plant import HeldPlant
 from .settings import SimulationSettings
 
-Progress = Callable[[float], None]
 
-
-class RunScenario(ControllerScenario, Protocol):
+class RunScenario(ControllerScenario, LearnerScenario, Protocol):
     """What a run needs of a scenario."""
 
     @property
@@ -33,15 +29,23 @@ class RunScenario(ControllerScenario, Protocol):
         """Settings of the run."""
         ...
 
+    @property
+    def initial_state(self) -> Array:
+        """ζ(0), (12,)."""
+        ...
+
     def plant_vehicle(self) -> Vehicle | None:
         """Return the vehicle that is driven, or None for the one of `station_keeping`."""
         ...
 
 
-class Policy(Protocol):
-    """What drives the vehicle: a controller, or a baseline with the same steps."""
+class VehiclePolicy(Protocol):
+    """What drives a vehicle: a controller, or a baseline with the same steps."""
 
-    u_disturbance: Array
+    @property
+    def u_disturbance(self) -> Array:
+        """u_2 at the last state, (6,)."""
+        ...
 
     def step(self, eta: Array, eta_dot: Array, dt: float) -> Array:
         """Return the body wrench to hold for dt, shape (6,)."""
@@ -54,11 +58,11 @@ class Policy(Protocol):
 
 def run(
     scenario: RunScenario,
-    policy: Policy | None = None,
+    policy: VehiclePolicy | None = None,
     progress: Progress | None = None,
     source: DisturbanceSource | None = None,
-) -> History:
-    """Run a scenario in closed loop, with its own controller unless a policy is given.
+) -> VehicleHistory:
+    """Run a vehicle's scenario in closed loop, with its own controller unless a policy is given.
 
     Ends early, keeping what was recorded and naming the reason, when the pitch leaves its band, the
     state leaves χ, anything is not finite, or the user interrupts.
@@ -70,75 +74,41 @@ def run(
     """
     if source is None:
         source = build_disturbance(scenario.simulation.disturbance)
-    loop = _Loop(scenario, Controller(scenario) if policy is None else policy, source)
-    started, worked = time.perf_counter(), time.process_time()
-    try:
-        loop.go(progress)
-    except KeyboardInterrupt:
-        loop.history.stopped = f"interrupted at t = {loop.t:.2f} s"
-    loop.finish()
-    loop.history.wall_seconds = time.perf_counter() - started
-    loop.history.processor_seconds = time.process_time() - worked
-    return loop.history
+    policy = Controller(scenario) if policy is None else policy
+    system = VehicleSystem(scenario, source)
+    drive(system, policy, scenario, progress)
+    return system.history
 
 
-class _Loop:
-    def __init__(self, scenario: RunScenario, policy: Policy, source: DisturbanceSource) -> None:
-        self.settings = scenario.simulation
-        self.station: StationKeeping = scenario.station_keeping()
-        self.policy = policy
-        self.monitor = None
-        if isinstance(policy, Controller):
-            self.monitor = Monitor(policy.learner, fixed_points(scenario.samples, self.station))
+class VehicleSystem(System[VehiclePolicy]):
+    """A vehicle behind its sensors, its observer and its thrusters."""
+
+    history: VehicleHistory
+
+    def __init__(self, scenario: RunScenario, source: DisturbanceSource) -> None:
+        settings = scenario.simulation
+        station: StationKeeping = scenario.station_keeping()
+        self.settings: SimulationSettings = settings
+        self.problem = station.problem
+        self.history = VehicleHistory(station.problem)
         vehicle = scenario.plant_vehicle()
-        self.plant = HeldPlant(self.station, source, self.settings.tolerance, vehicle)
-        limited = self.settings.thruster_limits
-        self.thrusters = Allocator(vehicle or self.station.model.vehicle) if limited else None
-        self.noise = MeasurementNoise(self.settings.noise)
-        bandwidth = self.settings.observer_bandwidth
-        self.observer = DisturbanceObserver(self.station, bandwidth) if bandwidth else None
-        self.history = History()
-        self.policy_seconds: list[float] = []
-        self.state = PlantState(np.array(self.settings.initial_state), 0.0, 0.0)
-        self.t = self.next_look = 0.0
+        self.plant = HeldPlant(station, source, settings.tolerance, vehicle)
+        limited = settings.thruster_limits
+        self.thrusters = Allocator(vehicle or station.model.vehicle) if limited else None
+        self.noise = MeasurementNoise(settings.noise)
+        bandwidth = settings.observer_bandwidth
+        self.observer = DisturbanceObserver(station, bandwidth) if bandwidth else None
+        self.state = PlantState(scenario.initial_state, 0.0, 0.0)
 
-    def go(self, progress: Progress | None) -> None:
-        period = self.settings.control_period
-        n_steps = round(self.settings.duration / period)
-        tau_b, tau_d = np.zeros(6), np.zeros(6)
-        for i in range(n_steps + 1):
-            self.t = i * period
-            reason = self._out_of_bounds()
-            if reason:
-                self.history.stopped = f"{reason} at t = {self.t:.2f} s"
-                return
-            try:
-                tau_b = self._command(period)
-            except (InputError, RunError, np.linalg.LinAlgError) as error:
-                self.history.stopped = f"the controller failed at t = {self.t:.2f} s: {error}"
-                return
-            if self.settings.mode == "game":
-                tau_d = self.policy.body_wrench(self.policy.u_disturbance)
-            self._record(tau_b, tau_d)
-            if i == n_steps:
-                return
-            try:
-                self.state = self.plant.advance(self.t, self.state, tau_b, tau_d, period)
-            except RunError as error:
-                self.history.stopped = str(error)
-                return
-            if progress is not None:
-                progress(self.t + period)
-
-    def _command(self, period: float) -> Array:
+    def command(self, policy: VehiclePolicy, period: float) -> Array:
         """Return what the vehicle gets of the policy's wrench: timed, compensated and allocated."""
         seen = self.noise.measure(self.state.zeta)
         started = time.perf_counter()
-        tau_b = self.policy.step(seen[:6], seen[6:], period)
-        self.policy_seconds.append(time.perf_counter() - started)
+        tau_b = policy.step(seen[:6], seen[6:], period)
+        self.history.policy_seconds.append(time.perf_counter() - started)
         if self.observer is not None:
             estimate = self.observer.step(seen, period)
-            tau_b = tau_b - self.policy.body_wrench(estimate)
+            tau_b = tau_b - policy.body_wrench(estimate)
             self.history.estimate.append(estimate)
         if self.thrusters is not None:
             given = self.thrusters.allocate(tau_b)
@@ -149,55 +119,27 @@ class _Loop:
             self.observer.applied(tau_b)
         return tau_b
 
-    def _out_of_bounds(self) -> str | None:
-        zeta, settings = self.state.zeta, self.settings
-        far = np.abs(zeta) / self.station.half_widths
-        if not math.isfinite(far.max()):
-            return "the state is not finite"
-        pitch = math.degrees(zeta[4])
-        if abs(pitch) > settings.pitch_limit:
-            return f"the pitch left ±{settings.pitch_limit:g} deg ({pitch:.1f} deg)"
-        if far.max() > settings.chi:
-            name = STATE_NAMES[int(far.argmax())]
-            return f"the state left chi ({name} is {far.max():.2f} half-widths, over {settings.chi:g})"
-        return None
+    def answer(self, policy: VehiclePolicy | None) -> Array:
+        """Return the body wrench of the policy's u_2, (6,)."""
+        return np.zeros(6) if policy is None else policy.body_wrench(policy.u_disturbance)
 
-    def _record(self, tau_b: Array, tau_d: Array) -> None:
+    def record(self, t: float, command: Array, answer: Array) -> None:
+        """Record time, state, wrench, inputs and cost."""
         history, state = self.history, self.state
-        _, u_control, disturbance = self.plant.rates(self.t, state.zeta, tau_b, tau_d)
-        history.time.append(self.t)
+        _, u_control, disturbance = self.plant.rates(t, state.zeta, command, answer)
+        history.time.append(t)
         history.zeta.append(state.zeta)
-        history.tau_b.append(tau_b)
+        history.tau_b.append(command)
         history.u_control.append(u_control)
         history.disturbance.append(disturbance)
         history.cost.append(state.cost)
         history.attenuated.append(state.attenuated)
-        if isinstance(self.policy, Controller) and self.policy.last_step is not None:
-            self._record_learner(self.policy.last_step)
 
-    def _record_learner(self, seen: LearnerStep, *, last: bool = False) -> None:
-        history = self.history
-        if self.monitor and (last or self.t >= self.next_look - 1e-9):
-            self.next_look = self.t + self.settings.monitor_period
-            history.looks.append(self.monitor.look(self.t, seen))
-        history.learn_time.append(self.t)
-        history.bellman_error.append(seen.bellman_error)
-        history.sample_error.append(seen.sample_error)
-        history.projecting.append(seen.projecting)
-        history.predicted_cost.append(seen.predicted_cost)
-        history.accepted.append(seen.accepted)
-        history.fallback.append(seen.fallback)
-        history.linear.append(seen.linear)
-        history.critic.append(seen.critic)
-        history.actor_1.append(seen.actor_1)
-        history.actor_2.append(seen.actor_2)
+    def advance(self, t: float, command: Array, answer: Array, period: float) -> None:
+        """Move the vehicle over a control period."""
+        self.state = self.plant.advance(t, self.state, command, answer, period)
 
-    def finish(self) -> None:
-        """Record the weights that the run ended with, and the policy's time."""
-        if self.policy_seconds:
-            self.history.policy_median = float(np.median(self.policy_seconds))
-            self.history.policy_mean = float(np.mean(self.policy_seconds))
-        if isinstance(self.policy, Controller) and self.policy.learn:
-            learner = self.policy.learner
-            self._record_learner(learner.observe(self.policy.zeta), last=True)
-            self.history.remembered = None if learner.memory is None else learner.memory.weights
+    def left_domain(self, zeta: Array) -> str | None:
+        """Return how the pitch is beyond its limit, or None."""
+        pitch, limit = math.degrees(zeta[4]), self.settings.pitch_limit
+        return f"the pitch left ±{limit:g} deg ({pitch:.1f} deg)" if abs(pitch) > limit else None

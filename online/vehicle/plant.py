@@ -4,36 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
 import casadi
 import numpy as np
-from casadi import DM, MX, SX
+from casadi import DM, SX
 
-from ...symbolic import Kernel, RunError, StationKeeping, Vehicle
+from ...symbolic import RunError, StationKeeping, Vehicle
 from ...symbolic.arrays import Array
-from ...symbolic.compiled import dense_function, export
-from ...symbolic.integration import dormand_prince_error, dormand_prince_step, integrate
+from ...symbolic.compiled import dense_function
 from ...symbolic.underwater import acceleration, earth_frame, jacobian, jacobian_inverse
+from ..loop import HeldRates, PlantState
 from .disturbance import DisturbanceSource
-
-
-@dataclass(frozen=True)
-class PlantState:
-    """The vehicle at one instant.
-
-    Attributes
-    ----------
-    zeta : (12,) pose error and rates
-    cost : integral of ζ'Qζ + u_1'R u_1 so far
-    attenuated : integral of γ^2 d'W_d d so far; the game's cost is the difference
-    """
-
-    zeta: Array
-    cost: float
-    attenuated: float
 
 
 class HeldPlant:
@@ -57,14 +40,14 @@ class HeldPlant:
         self.source = source
         self.tolerance = tolerance
         text = None if vehicle is None else vehicle.model_dump_json()
-        self._kernel, self._step = _kernels(station, text)
-        self._absolute = tolerance * np.append(1e-2 * station.half_widths, [1e-2, 1e-2])
+        size = np.append(1e-2 * station.half_widths, [1e-2, 1e-2])
+        self._held = HeldRates(_rates(station, text), size, tolerance, compiled=station.compiled)
         self._current = np.array(station.model.current)
 
     def rates(self, t: float, zeta: Array, tau_b: Array, tau_d: Array) -> tuple[Array, Array, Array]:
         """Return (ζ_dot and both cost rates (14,), u_1 (6,), d (6,)) at time t."""
         here = self.source.at(t, zeta[:3])
-        rates, u_control, disturbance = self._kernel(
+        rates, u_control, disturbance = self._held.evaluate(
             zeta,
             tau_b,
             tau_d,
@@ -99,56 +82,21 @@ class HeldPlant:
         here = self.source.at(start, y[:3])
         water = here.water_velocity + self._current
         held = (tau_b, tau_d, here.force, water, here.water_acceleration)
-        reached, error = self._step(y, end - start, self._absolute, self.tolerance, *held)
-        # written so that what is not finite is not accepted
-        return reached if error < 1.0 else None
+        return self._held.one_step(y, end - start, *held)
 
     def _integrated(self, start: float, end: float, y: Array, tau_b: Array, tau_d: Array) -> Array:
-        reached = integrate(
-            self._held(tau_b, tau_d, np.nextafter(end, start)),
-            y,
-            np.array([start, end]),
-            rtol=self.tolerance,
-            atol=self._absolute,
-            first_step=end - start,
-            max_calls=20_000,
-        )[-1]
-        return np.asarray(reached)
+        rates = self._under(tau_b, tau_d, np.nextafter(end, start))
+        return self._held.integrated(start, end, y, rates)
 
-    def _held(self, tau_b: Array, tau_d: Array, last: float) -> Callable[[float, Array], Array]:
+    def _under(self, tau_b: Array, tau_d: Array, last: float) -> Callable[[float, Array], Array]:
         """Return the rates with wrenches held, up to the time `last` before the source breaks."""
         return lambda t, y: self.rates(min(t, last), y[:12], tau_b, tau_d)[0]
 
 
 @lru_cache(maxsize=8)
-def _kernels(station: StationKeeping, vehicle: str | None) -> tuple[Kernel, Kernel]:
-    """Return the rates under held wrenches and a step of them; `vehicle` is the true one, as JSON."""
-    rates = held_rates(station, None if vehicle is None else Vehicle.model_validate_json(vehicle))
-    step = _held_step(rates)
-    compiled = station.model.compiled
-    return (
-        export(rates, compiled=compiled)[0],
-        export(step, compiled=compiled, operations=step.n_instructions())[0],
-    )
-
-
-def _held_step(rates: casadi.Function) -> casadi.Function:
-    """Return one step of DOP853 of the rates and its error, everything but the state held."""
-    y, h, absolute, relative = MX.sym("y", 14), MX.sym("h"), MX.sym("absolute", 14), MX.sym("relative")
-    held = {name: MX.sym(name, *rates.size_in(name)) for name in rates.name_in()[1:]}
-
-    def rate(point: MX) -> MX:
-        return rates(point[:12], *held.values())[0]
-
-    reached, error_5, error_3 = dormand_prince_step(rate, y, h)
-    scale = absolute + relative * casadi.fmax(casadi.fabs(y), casadi.fabs(reached))
-    return casadi.Function(
-        "held_step",
-        [y, h, absolute, relative, *held.values()],
-        [reached, dormand_prince_error(h, error_5, error_3, scale)],
-        ["y", "h", "absolute", "relative", *held],
-        ["reached", "error"],
-    )
+def _rates(station: StationKeeping, vehicle: str | None) -> casadi.Function:
+    """Return the rates under held wrenches; `vehicle` is the true one, as JSON."""
+    return held_rates(station, None if vehicle is None else Vehicle.model_validate_json(vehicle))
 
 
 def held_rates(station: StationKeeping, true: Vehicle | None = None) -> casadi.Function:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, model_validator
 
 from ...symbolic.toml import Settings
-from ...symbolic.value import BOUND
+from ..loop import RunSettings
 
 Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
@@ -62,22 +62,12 @@ class NoiseSettings(Settings):
     seed: NonNegativeInt = 1
 
 
-class SimulationSettings(Settings):
-    """One closed-loop run.
+class SimulationSettings(RunSettings):
+    """One closed-loop run; what only a vehicle has is refused for another problem.
 
     Attributes
     ----------
-    initial_state : (12,) x, y, z, φ, θ, ψ and their rates [m, rad, m/s, rad/s]
-    duration : [s]
-    mode : `game` drives the plant with û_1 + û_2, as the proof does; `disturbed` with û_1 and d(t)
-    control_period : zero-order hold of the controller [s]
-    tolerance : relative tolerance of the plant's integration
     pitch_limit : the run ends when |pitch| exceeds it [deg]
-    chi : the run ends, the vehicle lost, when a state exceeds this multiple of the full envelope's
-        half-width; the default is where predictions end too, and a quarter more than the optimum needs
-        from the envelope's corners (docs/robustness.md)
-    monitor_period : least time between two looks of the monitor [s]
-    seed : of the envelope states that `compare` adds
     plant : the vehicle that is driven, a shipped name or the path of a TOML file; the scenario's own,
         which the controller is made for, when not given
     plant_parameters : parameters of the driven vehicle that differ from its file's
@@ -85,17 +75,10 @@ class SimulationSettings(Settings):
     noise : on what the policy sees
     observer_bandwidth : of a `DisturbanceObserver` whose estimate is fed forward [1/s]; 0 is none. For
         `disturbed` mode: in `game` mode it would cancel what the disturbance player does
+    disturbance : d(t) of `disturbed` mode
     """
 
-    initial_state: tuple[float, ...] = Field(min_length=12, max_length=12)
-    duration: PositiveFloat = 60.0
-    mode: Literal["game", "disturbed"] = "game"
-    control_period: PositiveFloat = 0.02
-    tolerance: Annotated[float, Field(gt=0.0, lt=1e-2)] = 1e-8
     pitch_limit: Annotated[float, Field(gt=0.0, lt=90.0)] = 75.0
-    chi: PositiveFloat = BOUND
-    monitor_period: PositiveFloat = 1.0
-    seed: NonNegativeInt = 1
     plant: str | None = None
     plant_parameters: dict[str, Any] = Field(default_factory=dict)
     thruster_limits: bool = False

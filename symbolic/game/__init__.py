@@ -4,6 +4,7 @@ from .domain import Bound, margins_and_shown, outside, require_numbers
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import InverseDynamics, Problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
+from .stored import problem_from_data, problem_to_data
 
 __all__ = [
     "Bound",
@@ -16,6 +17,8 @@ __all__ = [
     "gamma_threshold",
     "margins_and_shown",
     "outside",
+    "problem_from_data",
+    "problem_to_data",
     "require_numbers",
     "stabilising_solution",
     "weight_matrix",

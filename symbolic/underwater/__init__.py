@@ -2,11 +2,12 @@
 
 from .dynamics import acceleration, earth_frame, inverse_dynamics
 from .kinematics import jacobian, jacobian_inverse
-from .model import STATE_NAMES, Model, require_pitch, require_vehicle_state
+from .model import FORCE_NAMES, STATE_NAMES, Model, require_pitch, require_vehicle_state
 from .station import StationKeeping
 from .vehicle import Thrusters, Vehicle
 
 __all__ = [
+    "FORCE_NAMES",
     "STATE_NAMES",
     "Model",
     "StationKeeping",

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ..compiled import Export
 from ..value import Setup
 from .model import Model
 
@@ -18,3 +20,8 @@ class StationKeeping(Setup):
     """
 
     model: Model
+
+    def exports(self, n_samples: int) -> Iterator[Export]:
+        """Build every function of vehicle and setup and yield what became of it."""
+        yield from self.model.exports()
+        yield from super().exports(n_samples)

@@ -12,12 +12,10 @@ A basis is a function from the scaled state x = ζ / scale to expressions. The s
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
-from pathlib import Path
 from types import MappingProxyType
 
 import casadi
@@ -26,6 +24,7 @@ from casadi import DM, SX
 
 from ..arrays import Array
 from ..errors import InputError, nearest
+from ..pyfile import find_callable, one_line
 
 BasisFunction = Callable[[SX], SX]
 
@@ -127,7 +126,7 @@ class Basis:
         except InputError:
             raise
         except Exception as error:
-            raise InputError(f"basis '{name}': the function raises {_one_line(error)}") from error
+            raise InputError(f"basis '{name}': the function raises {one_line(error)}") from error
         if not isinstance(sigma, SX) or sigma.shape[1] != 1 or sigma.shape[0] == 0:
             raise InputError(
                 f"basis '{name}': the function must return one column of casadi.SX expressions, "
@@ -190,24 +189,11 @@ def find_function(name: str) -> BasisFunction:
     """
     if name in SHIPPED:
         return SHIPPED[name]
-    file, separator, attribute = name.rpartition(":")
-    if not separator:
+    if ":" not in name:
         raise InputError(
             f"there is no basis '{name}': {nearest(name, SHIPPED)} (or give file.py:function)"
         )
-    path = Path(file).expanduser()
-    specification = importlib.util.spec_from_file_location(path.stem, path)
-    if not path.is_file() or specification is None or specification.loader is None:
-        raise InputError(f"there is no Python file '{file}'; give the basis as file.py:function")
-    module = importlib.util.module_from_spec(specification)
-    try:
-        specification.loader.exec_module(module)
-    except Exception as error:
-        raise InputError(f"'{file}' can't be loaded ({_one_line(error)})") from error
-    function = getattr(module, attribute, None)
-    if not callable(function):
-        raise InputError(f"'{file}' has no function '{attribute}'")
-    return function  # type: ignore[no-any-return]
+    return find_callable(name, "the basis")
 
 
 def _axes(x: SX, name: str, multiple: int) -> int:
@@ -220,7 +206,3 @@ def _axes(x: SX, name: str, multiple: int) -> int:
             f"{x.shape[0]}; use 'quadratic'"
         )
     return axes
-
-
-def _one_line(error: Exception) -> str:
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 from casadi import SX
 
 from ..arrays import Array
-from ..compiled import c_source, dense_function
+from ..compiled import Export, c_source, dense_function
 from ..game import Game, Problem
 from .basis import Basis
 from .functions import ValueFunctions
@@ -46,6 +47,10 @@ class Setup:
     def functions(self) -> ValueFunctions:
         """Compiled basis, sample kernel and policies."""
         return ValueFunctions(self.problem, self.basis, compiled=self.compiled)
+
+    def exports(self, n_samples: int) -> Iterator[Export]:
+        """Build every compiled function and yield what became of it, for so many sample points."""
+        yield from self.functions.exports(n_samples)
 
     @cached_property
     def fingerprint(self) -> str:

@@ -143,7 +143,7 @@ def default_gammas(problem: Problem) -> list[float]:
     return [float(threshold * (1.0 + x)) for x in np.geomspace(0.05, 9.0, 12)]
 
 
-def value_against_gamma(
+def gamma_curve(
     problem: Problem,
     zeta0: Array,
     gammas: Sequence[float] | None = None,

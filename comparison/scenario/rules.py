@@ -1,0 +1,75 @@
+"""Which keys of a scenario go together, and where a run may start."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import BaseModel
+
+from ...online import SimulationSettings
+from ...symbolic import InputError
+from ...symbolic.arrays import Array
+
+VEHICLE_NEEDS = (
+    *(("game", key) for key in ("Q", "R", "gamma")),
+    *(("envelope", "half_widths"), ("simulation", "initial_state")),
+)
+VEHICLE_ONLY = {  # by group
+    "": ("vehicle_parameters", "current"),
+    "game": ("Q", "R", "W_d"),
+    "simulation": (
+        *("pitch_limit", "plant", "plant_parameters", "thruster_limits", "noise"),
+        *("observer_bandwidth", "disturbance"),
+    ),
+    "learner": ("weights_vehicle",),
+}
+
+
+def require_keys(scenario: BaseModel, problem: str | None) -> None:
+    """Raise ValueError where a vehicle's scenario lacks a key, or a problem's has one for vehicles."""
+    if problem is None:
+        for group, key in VEHICLE_NEEDS:
+            if getattr(getattr(scenario, group), key) is None:
+                raise ValueError(f"the key '{group}.{key}' is required and missing; add it")
+        return
+    unused = next(_vehicle_only(scenario), None)
+    if unused is not None:
+        raise ValueError(
+            f"'{unused}' is for a vehicle, but the scenario is of the problem '{problem}'; leave it out"
+        )
+
+
+def _vehicle_only(scenario: BaseModel) -> Iterator[str]:
+    """Yield the keys of a scenario, away from their defaults, that only a vehicle has a use for."""
+    for group, keys in VEHICLE_ONLY.items():
+        holder = getattr(scenario, group) if group else scenario
+        for key in keys:
+            default = type(holder).model_fields[key].get_default(call_default_factory=True)
+            if getattr(holder, key) != default:
+                yield f"{group}.{key}" if group else key
+    if getattr(scenario, "simulation").mode == "disturbed":  # noqa: B009 - any scenario
+        yield "simulation.mode=disturbed"
+
+
+def require_start(
+    simulation: SimulationSettings, state: Array, names: Sequence[str], half_widths: ArrayLike
+) -> None:
+    """Raise InputError where a run would end at its start, beyond χ."""
+    far = np.abs(state) / np.asarray(half_widths)
+    if far.max() > simulation.chi:
+        raise InputError(
+            f"the initial state's {names[int(far.argmax())]} is {far.max():.2f} half-widths of the "
+            f"envelope, but a run ends beyond chi = {simulation.chi:g}; start closer or raise "
+            "simulation.chi"
+        )
+
+
+def require_level(simulation: SimulationSettings, pitch: float) -> None:
+    """Raise InputError where a vehicle's pitch [rad] is beyond the limit of a run."""
+    if abs(np.degrees(pitch)) > simulation.pitch_limit:
+        raise InputError(
+            f"the initial state's pitch is {np.degrees(pitch):.1f} deg, but a run ends beyond "
+            f"{simulation.pitch_limit:g} deg; start closer to level or raise simulation.pitch_limit"
+        )

@@ -1,0 +1,153 @@
+"""What drives a plant: any control law, and the learner's."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from ...symbolic import InputError, Setup
+from ...symbolic.arrays import Array
+from ..learning import Learner, LearnerSettings, LearnerStep, SampleSettings
+from ..rows import FixedSamples, SampleStrategy, ShrinkingSamples, TrajectorySamples, draw_samples
+
+
+class Policy(Protocol):
+    """A control law u_1(ζ), and the disturbance player that answers it in `game` mode.
+
+    Attributes
+    ----------
+    u_disturbance : (k_2,) u_2 at the last state
+    """
+
+    @property
+    def u_disturbance(self) -> Array:
+        """u_2 at the last state, (k_2,)."""
+        ...
+
+    def step(self, zeta: Array, dt: float) -> Array:
+        """Return u_1 at ζ (n,) to hold for dt [s], shape (k,)."""
+        ...
+
+
+class LearnerScenario(Protocol):
+    """What a learner in a loop needs of a scenario."""
+
+    @property
+    def learner(self) -> LearnerSettings:
+        """Settings of the actor-critic."""
+        ...
+
+    @property
+    def samples(self) -> SampleSettings:
+        """Settings of the sample points."""
+        ...
+
+    def setup(self) -> Setup:
+        """Return problem, basis and envelope."""
+        ...
+
+    def initial_weights(self) -> Array | None:
+        """Return the weights to start from, or None for weight_factor times the Riccati weights."""
+        ...
+
+
+class LearnedPolicy:
+    """The learner's policy, which learns whenever its period has passed.
+
+    Parameters
+    ----------
+    scenario : problem, basis, learner and samples
+    learn : False keeps the initial weights (with the default ones, the policy -R^-1 g(ζ)'P ζ); with a
+        safeguard, only from where they are predicted to cost less than the reference weights and the
+        linear H-infinity policy
+
+    Attributes
+    ----------
+    learner : the actor-critic
+    period : time between learning steps [s]
+    certify : whether frozen weights are certified
+    zeta : (n,) the last state
+    u_control, u_disturbance : (k,) û_1 and û_2 there
+    last_step : what the last learning step saw; None where the last step did not learn
+    """
+
+    def __init__(self, scenario: LearnerScenario, *, learn: bool = True) -> None:
+        setup = scenario.setup()
+        self.learn = learn
+        reference, weights = _start(scenario, setup)
+        self.learner = Learner(
+            setup.problem,
+            setup.basis,
+            scenario.learner,
+            sample_strategy(scenario.samples, setup)
+            if learn
+            else np.zeros((0, setup.problem.n_states)),
+            reference,
+            weights,
+            setup.functions,
+            scenario.samples,
+            setup.envelope if learn and scenario.samples.remember else None,
+        )
+        # nothing to certify where the frozen weights are the reference's own
+        safeguarded = not learn and scenario.learner.safeguard
+        self.certify = safeguarded and weights is not None and weights is not reference
+        self.period = scenario.learner.period
+        self._since: float | None = None
+        self.last_step: LearnerStep | None = None
+        self.zeta = np.zeros(setup.problem.n_states)
+        self.u_control = np.zeros(setup.problem.n_inputs)
+        self.u_disturbance = np.zeros(len(setup.game.W_d))
+
+    def step(self, zeta: Array, dt: float) -> Array:
+        """Return û_1 at ζ (n,) to hold for dt [s], shape (k,).
+
+        Learns at the first call, and then whenever `period` has passed since it last did.
+        """
+        self.zeta, self.last_step = zeta, None
+        since = self.period if self._since is None else self._since + dt
+        if self.learn and since >= self.period * (1.0 - 1e-9):
+            self.last_step = self.learner.step(zeta, since)
+            since = 0.0
+        elif self.certify and since >= self.period * (1.0 - 1e-9):
+            self.last_step = self.learner.certify(zeta)
+            since = 0.0
+        self._since = since
+        self.u_control, self.u_disturbance = self.learner.policies(zeta)
+        return self.u_control
+
+
+def _start(scenario: LearnerScenario, setup: Setup) -> tuple[Array, Array | None]:
+    """Return the reference weights, and those to start from, or None for the settings' multiple."""
+    weights, settings = scenario.initial_weights(), scenario.learner
+    if settings.reference == "riccati":
+        return setup.riccati_weights, weights
+    start = setup.riccati_weights * settings.weight_factor if weights is None else weights
+    if not np.any(start):
+        raise InputError(
+            "learner.reference is 'initial', but the initial weights are zero, which leaves the "
+            'projection a ball without points; set learner.reference = "riccati" or start elsewhere'
+        )
+    return start, start
+
+
+def sample_strategy(settings: SampleSettings, setup: Setup) -> SampleStrategy:
+    """Return the strategy that the settings name."""
+    if settings.strategy == "trajectory":
+        return TrajectorySamples(
+            setup.half_widths,
+            settings.number,
+            settings.seed,
+            spread=settings.spread,
+            ahead=settings.ahead,
+        )
+    if settings.strategy == "shrinking":
+        box, inner = setup.half_widths, settings.inner
+        points = draw_samples(box, settings.number, settings.seed, inner=inner)
+        return ShrinkingSamples(points, box, settings.spread)
+    return FixedSamples(fixed_points(settings, setup))
+
+
+def fixed_points(settings: SampleSettings, setup: Setup) -> Array:
+    """Return the fixed ζ_j of (18), in the envelope, whatever the strategy, shape (N, n)."""
+    return draw_samples(setup.envelope, settings.number, settings.seed, inner=settings.inner)

@@ -1,0 +1,37 @@
+"""Settings of a closed-loop run of any problem."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, NonNegativeInt, PositiveFloat
+
+from ...symbolic.toml import Settings
+from ...symbolic.value import BOUND
+
+
+class RunSettings(Settings):
+    """One closed-loop run.
+
+    Attributes
+    ----------
+    initial_state : (n,) ζ(0); half of the envelope's half-widths when not given
+    duration : [s]
+    mode : `game` drives the plant with û_1 + û_2, as the proof does; `disturbed` with û_1 and d(t)
+    control_period : zero-order hold of the controller [s]
+    tolerance : relative tolerance of the plant's integration
+    chi : the run ends, the plant lost, when a state exceeds this multiple of the full envelope's
+        half-width; the default is where predictions end too, and a quarter more than the optimum needs
+        from the envelope's corners (docs/robustness.md)
+    monitor_period : least time between two looks of the monitor [s]
+    seed : of the envelope states that `compare` adds
+    """
+
+    initial_state: tuple[float, ...] | None = None
+    duration: PositiveFloat = 60.0
+    mode: Literal["game", "disturbed"] = "game"
+    control_period: PositiveFloat = 0.02
+    tolerance: Annotated[float, Field(gt=0.0, lt=1e-2)] = 1e-8
+    chi: PositiveFloat = BOUND
+    monitor_period: PositiveFloat = 1.0
+    seed: NonNegativeInt = 1

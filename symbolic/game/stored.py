@@ -1,0 +1,94 @@
+"""A problem as data: its equations as lists of instructions, its weights as numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import casadi
+import numpy as np
+from casadi import SX
+
+from ..arrays import Array
+from ..errors import InputError
+from ..expressions import from_data, to_data
+from .domain import Bound
+from .game import Game
+from .problem import InverseDynamics, Problem
+
+NAMES = ("state_names", "state_units", "input_names", "input_units")
+
+
+def problem_to_data(problem: Problem) -> dict[str, Any]:
+    """Return a problem as what JSON can hold; `problem_from_data` gives the very same back.
+
+    All its equations are one function, so that nodes which they share stay shared.
+    """
+    game, inverse = problem.game, problem.inverse_dynamics
+    parts = {"drift": problem.drift, "control_matrix": problem.control_matrix}
+    if not problem.same_inputs:
+        parts["disturbance_matrix"] = problem.disturbance_matrix
+    parts["switching"] = problem.switching
+    for i, bound in enumerate(problem.domain):
+        parts[f"margin_{i}"] = bound.margin
+        parts[f"shown_{i}"] = bound.margin if bound.shown is None else bound.shown
+    inputs = {"zeta": problem.zeta}
+    if inverse is not None:
+        inputs["acceleration"], parts["inverse"] = inverse.acceleration, inverse.v
+    equations = casadi.Function("equations", [*inputs.values()], [*parts.values()], [*inputs], [*parts])
+    weights = {name: getattr(game, name).tolist() for name in ("Q", "R", "W_d")}
+    return {
+        "name": problem.name,
+        "scale": problem.scale.tolist(),
+        **{name: list(getattr(problem, name)) for name in NAMES},
+        "game": weights | {"gamma": game.gamma if np.isfinite(game.gamma) else None},
+        "domain": [bound.sentence for bound in problem.domain],
+        "equations": to_data(equations),
+    }
+
+
+def problem_from_data(data: Mapping[str, Any]) -> Problem:
+    """Return the problem of `problem_to_data`.
+
+    Raises
+    ------
+    InputError
+        If the data are not those of a problem.
+    """
+    try:
+        equations = from_data(data["equations"])
+        names = [equations.name_in(i) for i in range(equations.n_in())]
+        symbols = [SX.sym(name, *equations.size_in(i)) for i, name in enumerate(names)]
+        results = equations.call(symbols)
+        parts = {equations.name_out(i): result for i, result in enumerate(results)}
+        given, weights = dict(zip(names, symbols, strict=True)), data["game"]
+        gamma = np.inf if weights["gamma"] is None else float(weights["gamma"])
+        inverse = None
+        if "acceleration" in given:
+            inverse = InverseDynamics(given["acceleration"], parts["inverse"])
+        domain = tuple(
+            Bound(parts[f"margin_{i}"], str(sentence), parts[f"shown_{i}"])
+            for i, sentence in enumerate(data["domain"])
+        )
+        return Problem(
+            name=str(data["name"]),
+            zeta=given["zeta"],
+            drift=parts["drift"],
+            control_matrix=parts["control_matrix"],
+            disturbance_matrix=parts.get("disturbance_matrix", parts["control_matrix"]),
+            game=Game(**{name: _matrix(weights[name]) for name in ("Q", "R", "W_d")}, gamma=gamma),
+            scale=_matrix(data["scale"]),
+            domain=domain,
+            switching=parts["switching"],
+            inverse_dynamics=inverse,
+            **{name: tuple(map(str, data[name])) for name in NAMES},
+        )
+    except (KeyError, TypeError, IndexError) as error:
+        raise InputError(f"these are not the data of a problem ({error!r}); make them again") from None
+
+
+def _matrix(values: Any) -> Array:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (ValueError, TypeError):
+        raise InputError("the data of a problem hold a matrix that is none; make them again") from None
