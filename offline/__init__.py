@@ -16,6 +16,8 @@ from .responses import (
     WorstCaseSolver,
     learned_policy,
     linear_policy,
+    saddle_gap,
+    worst_case,
 )
 from .saddle import (
     GammaCurve,
@@ -23,7 +25,7 @@ from .saddle import (
     GammaPoint,
     SaddleSolution,
     SaddleSolver,
-    value_against_gamma,
+    gamma_curve,
 )
 from .settings import OfflineSettings, horizon_of
 from .solve import OfflineSolution, OfflineSolver, solve
@@ -58,9 +60,11 @@ __all__ = [
     "WorstCaseSolver",
     "error_sizes",
     "fit_weights",
+    "gamma_curve",
     "horizon_of",
     "learned_policy",
     "linear_policy",
+    "saddle_gap",
     "solve",
-    "value_against_gamma",
+    "worst_case",
 ]

@@ -13,6 +13,7 @@ states.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ import numpy as np
 from ..symbolic import Basis, InputError
 from ..symbolic.arrays import Array
 from ..symbolic.compiled import BatchKernel, dense_function
+from .solve import OfflineSolution
 
 RIDGE = 1e-10
 
@@ -57,6 +59,20 @@ class Pairs:
             raise InputError(
                 "relative errors need states away from the origin with positive finite values"
             )
+
+    @classmethod
+    def of(cls, optima: Iterable[OfflineSolution]) -> Pairs:
+        """Return the pairs of certified optima; raises InputError if one of them is not certified."""
+        found = list(optima)
+        for optimum in found:
+            if optimum.faults:
+                raise InputError(
+                    f"the optimum from {np.array2string(optimum.direct.zeta, precision=3)} is not "
+                    f"certified: {'; '.join(optimum.faults)}; leave it out"
+                )
+        states = np.array([optimum.direct.zeta for optimum in found])
+        values = np.array([optimum.value for optimum in found])
+        return cls(states, values, np.array([optimum.costate for optimum in found]))
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ class OfflineSettings(Settings):
     Attributes
     ----------
     horizon : [s]; after it the cost is ζ(T)'P ζ(T). None chooses it by the decay of the closed loop
-    intervals : K at the start, before alignment with the velocity sign changes and refinement
+    intervals : K at the start, before alignment and refinement
     degree : Radau points an interval at the start
     grading : about the logarithm of the ratio of the last to the first interval; 0 is uniform
-    aligned : put mesh points where the velocities change sign
+    aligned : put mesh points where switching functions change sign, such as the velocities under drag
     rounds : of refinement at most; 1 solves on the first mesh only
     starts : pairs of continuations that look for other extremals; 0 looks for none
     method : "newton", the structured Newton method where the plant is fully actuated and IPOPT

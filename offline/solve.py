@@ -71,9 +71,9 @@ class OfflineSolver:
         Raises
         ------
         InputError
-            If the state is not finite, of the wrong shape or pitched by 90 degrees.
+            If the state is not n finite numbers inside the domain.
         RunError
-            If no solver converges.
+            If no solver converges inside the domain.
         """
         started = time.perf_counter()
         first = self.direct.solve(zeta0, guess=guess, verify=False)

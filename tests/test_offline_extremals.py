@@ -25,9 +25,8 @@ def on_axis(problem: Problem, axis: int) -> Problem:
         whole[i] = only[i]
     drift, g = substitute([problem.drift, problem.input_matrix], [problem.zeta], [whole])
     reduced = Game(game.Q[np.ix_(keep, keep)], game.R[axis, axis : axis + 1], np.eye(1), game.gamma)
-    return Problem(
-        "on an axis", zeta, drift[keep], g[keep, axis], reduced, problem.scale[keep], zeta[1]
-    )
+    scale = problem.scale[keep]
+    return Problem("on an axis", zeta, drift[keep], g[keep, axis], reduced, scale, switching=zeta[1])
 
 
 @AXES

@@ -89,8 +89,10 @@ BAD: dict[str, object] = {
 
 @pytest.mark.parametrize("name", BAD)
 @pytest.mark.parametrize("how", ["solve", "OfflineSolver", "DirectSolver", "aligned"])
-def test_bad_states_are_refused(name: str, how: str, one_sentence: Check) -> None:
-    problem, _, _ = linear_quadratic()
+def test_bad_states_are_refused(
+    name: str, how: str, reference_problem: Problem, one_sentence: Check
+) -> None:
+    problem = reference_problem
     small = OfflineSettings(horizon=5.0, intervals=4)
     direct = DirectSolver(problem, horizon=5.0, n_intervals=4)
     calls: dict[str, Callable[[], object]] = {

@@ -13,9 +13,9 @@ from stationkeep.offline import (
     GammaCurveSolver,
     GammaPoint,
     SaddleSolver,
-    value_against_gamma,
+    gamma_curve,
 )
-from stationkeep.offline.saddle.gamma_curve import default_gammas
+from stationkeep.offline.saddle.gamma import default_gammas
 from stationkeep.symbolic import Game, InputError, Problem, RunError, game_riccati
 
 from .games import FAR_STATE, FAR_VALUE, HALF_WIDTHS, Array, two_state
@@ -30,7 +30,7 @@ BETWEEN = (0.5 * (LEFT**-2 + RIGHT**-2) + SPAN * NODES) ** -0.5
 @pytest.fixture(scope="module")
 def curve(reference_problem: Problem) -> GammaCurve:
     """From the far state: ends and Gauss points of (1.4, 3), the game's own γ, and both extremes."""
-    return value_against_gamma(reference_problem, FAR_STATE, [50.0, 1.05, 2.0, LEFT, RIGHT, *BETWEEN])
+    return gamma_curve(reference_problem, FAR_STATE, [50.0, 1.05, 2.0, LEFT, RIGHT, *BETWEEN])
 
 
 def at(curve: GammaCurve, gamma: float) -> GammaPoint:
@@ -77,7 +77,7 @@ def test_linear_game(reference_problem: Problem) -> None:
     def riccati(gamma: float) -> Array:
         return game_riccati(A, B, Game(game.Q, game.R, game.W_d, gamma))
 
-    found = value_against_gamma(linear, FAR_STATE, [1.1, 2.0, 5.0])
+    found = gamma_curve(linear, FAR_STATE, [1.1, 2.0, 5.0])
     for point in found.points:
         assert point.value == pytest.approx(FAR_STATE @ riccati(point.gamma) @ FAR_STATE, rel=1e-9)
         assert point.linear_value == pytest.approx(point.value, rel=1e-9)
@@ -87,7 +87,7 @@ def test_linear_game(reference_problem: Problem) -> None:
 
 
 def test_small_states_have_the_linear_curve(reference_problem: Problem) -> None:
-    found = value_against_gamma(reference_problem, 1e-4 * HALF_WIDTHS, [1.2, 3.0])
+    found = gamma_curve(reference_problem, 1e-4 * HALF_WIDTHS, [1.2, 3.0])
     for point in found.points:
         assert point.value == pytest.approx(point.linear_value, rel=1e-3)
 
@@ -97,9 +97,9 @@ def test_horizon_follows_the_closed_loop(
 ) -> None:
     """Close to γ* twice the horizon changes nothing, though 120 s are 2e-6 short of it."""
     start = np.array([0.7, -0.35, 0.35, 0.1, -0.07, 0.35, 0, 0, 0, 0, 0, 0])
-    near = value_against_gamma(reference_problem, start, [1.02]).points[0]
-    monkeypatch.setattr("stationkeep.offline.saddle.gamma_curve.HORIZON", 20.0)
-    twice = value_against_gamma(reference_problem, start, [1.02]).points[0]
+    near = gamma_curve(reference_problem, start, [1.02]).points[0]
+    monkeypatch.setattr("stationkeep.offline.saddle.gamma.HORIZON", 20.0)
+    twice = gamma_curve(reference_problem, start, [1.02]).points[0]
     assert near.value == pytest.approx(twice.value, rel=1e-11)
     assert near.slope == pytest.approx(twice.slope, rel=1e-9)
     short = SaddleSolver(reference_problem.with_gamma(1.02)).solve(start).value
@@ -113,7 +113,7 @@ def test_default_levels_are_denser_towards_the_threshold(reference_problem: Prob
     steps = np.diff(np.log(levels - 1.0))
     np.testing.assert_allclose(steps, steps[0], rtol=1e-9)
     problem, _, _ = two_state()
-    found = value_against_gamma(problem, np.array([1.0, -0.5]))
+    found = gamma_curve(problem, np.array([1.0, -0.5]))
     assert len(found.points) == len(default_gammas(problem))
     assert found.faults == []
 
@@ -150,7 +150,7 @@ def test_a_lost_level_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None
         return solve(solver, *arguments, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr(SaddleSolver, "solve_aligned", lost)
-    found = value_against_gamma(problem, np.array([1.0, 0.5]), [1.5, 2.0, 3.0])
+    found = gamma_curve(problem, np.array([1.0, 0.5]), [1.5, 2.0, 3.0])
     assert found.faults == ["gamma = 2: lost on the way"]
     assert np.isnan(found.points[1].value)
     assert found.points[1].linear_value > 0.0

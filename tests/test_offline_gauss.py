@@ -37,3 +37,11 @@ def test_interpolation_keeps_polynomials_of_its_degree() -> None:
         sampled = interpolate(rule.points, mesh, values, times)
         np.testing.assert_allclose(sampled[:, 0], function(times), atol=1e-13)
         np.testing.assert_allclose(sampled[:, 1], -function(times), atol=1e-13)
+
+
+def test_interpolation_of_straight_lines_between_their_ends() -> None:
+    """At a point itself the barycentric sum of the others may vanish."""
+    mesh, ends = np.array([0.0, 1.0, 3.0]), np.array([[[0.0], [1.0]], [[1.0], [5.0]]])
+    times = np.array([0.0, 0.5, 1.0, 2.0, 3.0])
+    found = interpolate(np.array([0.0, 1.0]), mesh, ends, times)
+    np.testing.assert_allclose(found[:, 0], [0.0, 0.5, 1.0, 3.0, 5.0], rtol=1e-15)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import casadi
 import numpy as np
@@ -243,3 +244,17 @@ def test_mesh_that_does_not_settle_ends_after_its_rounds() -> None:
         oscillators(), mesh, first, lambda path: path, solve_on, fixed=np.array([1.0]), rounds=1
     )
     np.testing.assert_allclose(fixed[-1].mesh, [0.0, 0.5, 0.9, 1.0, 1.5, 2.0], atol=1e-10)
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_the_documentation_says_what_the_named_settings_are(name: str) -> None:
+    text = (Path(__file__).parents[1] / "docs" / "offline.md").read_text(encoding="utf-8")
+    (row,) = [line for line in text.splitlines() if line.startswith(f"| `{name}` |")]
+    horizon, *others = [cell.strip() for cell in row.split("|")[2:6]]
+    settings: MeshSettings = getattr(MeshSettings, name)
+    assert [float(cell) for cell in others] == [
+        settings.n_intervals,
+        settings.degree,
+        settings.grading,
+    ]
+    assert horizon == ("by decay" if name == "certified" else f"{settings.horizon:g}")

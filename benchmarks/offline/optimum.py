@@ -22,6 +22,7 @@ from stationkeep.offline import (
     BestResponse,
     ControlPolicy,
     DirectSolver,
+    MeshSettings,
     OfflineSettings,
     OfflineSolver,
     SaddleSolver,
@@ -129,7 +130,7 @@ def mirrored(problem: Problem, solver: OfflineSolver) -> None:
 def saddle(_: int) -> None:
     """Best responses of both players to the other's feedback, and the linear policy's worst case."""
     problem = reference()
-    direct = DirectSolver(problem, horizon=120.0, n_intervals=40, degree=5)
+    direct = DirectSolver(problem)
     best = BestResponse(problem)
     worst = WorstCaseSolver(ControlPolicy(problem, linear_policy(problem)))
     print(
@@ -160,19 +161,12 @@ def speed(_: int) -> None:
     states = envelope_states(problem, 100, seed=1)
     fine = DirectSolver(problem, horizon=120.0, n_intervals=80, degree=6)
     truth = [fine.solve_aligned(zeta, verify=False)[0].value for zeta in states]
-    print("\nRe-solve from 100 new states, 16 intervals of degree 6 over 60 s")
+    print(f"\nRe-solve from 100 new states, {MeshSettings.quick}")
     print(f"  {'':<18}{'build [s]':>10}{'median [ms]':>13}{'worst [ms]':>12}{'states/s':>10}", end="")
     print(f"{'median error':>14}{'worst error':>13}")
     for method in ("newton", "ipopt"):
         started = time.perf_counter()
-        solver = DirectSolver(
-            problem,
-            horizon=60.0,
-            n_intervals=16,
-            degree=6,
-            grading=6.0,
-            method=method,  # type: ignore[arg-type]
-        )
+        solver = DirectSolver(problem, MeshSettings.quick, method=method)  # type: ignore[arg-type]
         solver.solve(0.5 * states[0], verify=False)
         build = time.perf_counter() - started
         seconds, errors = [], []

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
-from ..path import Grid, MeshChanges, MeshSettings, Plant, Trajectory, reintegrate, settle
+from ..path import Domain, Grid, MeshChanges, MeshSettings, Plant, Trajectory, reintegrate, settle
 from ..settings import Method
 from .derivatives import PointDerivatives
 from .guess import LinearStart
@@ -86,6 +86,7 @@ class DirectSolver:
     ) -> None:
         self.problem = problem
         self.plant = Plant(problem)
+        self.domain = Domain(problem.zeta, problem.domain)
         settings = settings.changed(**changes)
         self.mesh, self.degree = settings.points, settings.degree
         usable = method == "newton" and problem.inverse_dynamics is not None
@@ -113,9 +114,9 @@ class DirectSolver:
         Raises
         ------
         InputError
-            If the state is not finite, of the wrong shape or pitched by 90 degrees.
+            If the state is not n finite numbers inside the domain.
         RunError
-            If the last method tried does not converge.
+            If the last method tried does not converge, or its trajectory leaves the domain.
         """
         zeta0 = self.problem.require_state(zeta0)
         mesh = self.mesh if mesh is None else mesh
@@ -146,10 +147,10 @@ class DirectSolver:
         tolerance: float = 1e-6,
         rounds: int = 6,
     ) -> tuple[DirectSolution, Array]:
-        """Return the optimum on a mesh with points where the velocities change sign, and their times.
+        """Return the optimum on a mesh with points at its sign changes, and their times.
 
-        Drag |ν|ν is only C^1 there, which limits collocation to low order. Solve, locate the sign
-        changes, put mesh points on them, and repeat until they move by less than `tolerance` [s].
+        They are those of the switching functions along its own trajectory. The mesh is settled on them
+        to `tolerance` [s] in as many `rounds` at most; see `settle`.
         Arguments and errors otherwise as of `solve`.
         """
 
@@ -256,6 +257,7 @@ class DirectSolver:
         method: Method,
         iterations: int,
     ) -> DirectSolution:
+        self.domain.require(path.times, path.states)
         game, zeta0 = self.problem.game, path.states[0]
         f, g = self.plant.terms(zeta0)
         u_control, u_disturbance = game.policies(g, costate)

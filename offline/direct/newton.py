@@ -28,7 +28,7 @@ from casadi import DM, SX
 from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ...symbolic.compiled import BatchKernel, dense_function
-from ..path import Bent, Grid, Pass, adjoint, backward
+from ..path import ConjugatePoint, Grid, RiccatiPass, adjoint, backward
 from .guess import LinearStart
 
 
@@ -88,7 +88,7 @@ class StructuredNewton:
                 f"{problem.name}: the structured Newton method needs a fully actuated plant with its "
                 "inverse dynamics; use IPOPT"
             )
-        self.problem = problem
+        self.problem, self._inverse = problem, problem.inverse_dynamics
         self._compiled = compiled
         self._start = LinearStart(problem, compiled=compiled)
 
@@ -162,8 +162,7 @@ class StructuredNewton:
 
     def _cost(self) -> tuple[SX, SX, SX]:
         """Return the symbol (η, η_dot, a), and L and v of it."""
-        problem, inverse = self.problem, self.problem.inverse_dynamics
-        assert inverse is not None  # checked on construction
+        problem, inverse = self.problem, self._inverse
         zeta, a, v = problem.zeta, inverse.acceleration, inverse.v
         L = zeta.T @ DM(problem.game.Q) @ zeta + v.T @ DM(problem.game.R_eff) @ v
         point = SX.sym("point", 3 * problem.n_inputs)
@@ -187,21 +186,21 @@ class StructuredNewton:
             hessian=grid.condense(hessian),
         )
 
-    def _step(self, grid: Grid, model: _Model) -> Pass:
+    def _step(self, grid: Grid, model: _Model) -> RiccatiPass:
         """Return Newton's step, or where the model is not convex one between it and Gauss-Newton's."""
         found = self._backward(grid, model, model.hessian)
-        if isinstance(found, Pass):
+        if isinstance(found, RiccatiPass):
             return found
         (flat,) = self._convex_point(model.points)
         convex = grid.condense(flat)
         for part in (0.5, 0.0):
             blend = convex + part * (model.hessian - convex)
             found = self._backward(grid, model, blend)
-            if isinstance(found, Pass):
+            if isinstance(found, RiccatiPass):
                 return found
         raise RunError("the Gauss-Newton model of the cost is not convex; Q and R_eff must be")
 
-    def _backward(self, grid: Grid, model: _Model, hessian: Array) -> Pass | Bent:
+    def _backward(self, grid: Grid, model: _Model, hessian: Array) -> RiccatiPass | ConjugatePoint:
         P = 2.0 * self.problem.P
         return backward(grid, hessian, model.gradient, P, P @ model.end, self._inertia)
 
@@ -226,7 +225,7 @@ class StructuredNewton:
 
     def _result(self, grid: Grid, model: _Model, iterations: int) -> NewtonResult:
         found = self._backward(grid, model, model.hessian)
-        if isinstance(found, Pass):
+        if isinstance(found, RiccatiPass):
             costate, hessian, curvature = found.p, found.P, None
         else:
             costate = adjoint(grid, model.gradient, 2.0 * self.problem.P @ model.end)

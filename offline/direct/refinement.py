@@ -1,8 +1,9 @@
 """A mesh and a degree that reach a requested error, driven by an estimate of it.
 
-On a mesh aligned with the velocity sign changes the solution of degree d is compared with that of
-degree d + 1. Because the cost is stationary, a control that is wrong by δv costs the integral of
-δv'R_eff δv more (exactly so for a linear-quadratic game), which gives each interval its share:
+On a mesh aligned with the sign changes of the switching functions the solution of degree d is compared
+with that of degree d + 1. Because the cost is stationary, a control that is wrong by δv costs the
+integral of δv'R_eff δv more (exactly so for a linear-quadratic game), which gives each interval its
+share:
 
     e_i = ∫_i (v_{d+1} - v_d)'R_eff (v_{d+1} - v_d) dt / V.
 
@@ -32,7 +33,7 @@ class Refined:
     ----------
     solution : re-integrated
     better : of one degree more
-    events : (e,) velocity sign changes, where the mesh has points [s]
+    events : (e,) sign changes of switching functions, where the mesh has points [s]
     rounds : of refinement
     """
 

@@ -15,9 +15,10 @@ import casadi
 import numpy as np
 from casadi import DM, SX
 
-from ...symbolic import Kernel, Problem
+from ...symbolic import Bound, Kernel, Problem
 from ...symbolic.arrays import Array
 from ...symbolic.compiled import dense_function
+from ..path import Domain
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,7 @@ class Stage:
     rate : (n,) expression F
     running : scalar expression L
     terminal : (n, n) symmetric E
+    domain : bounds outside of which F has no meaning
     """
 
     zeta: SX
@@ -40,12 +42,18 @@ class Stage:
     rate: SX
     running: SX
     terminal: Array
+    domain: tuple[Bound, ...] = ()
 
     @cached_property
     def point(self) -> casadi.Function:
         """(ζ, w, p) -> (F, L)."""
         inputs = {"zeta": self.zeta, "w": self.w, "parameters": self.parameters}
         return dense_function("point", inputs, {"rate": self.rate, "running": self.running})
+
+    @cached_property
+    def inside(self) -> Domain:
+        """The domain for whole trajectories."""
+        return Domain(self.zeta, self.domain)
 
     @cached_property
     def kernel(self) -> Kernel:
@@ -64,6 +72,7 @@ def single_player(problem: Problem) -> Stage:
         rate=problem.drift + problem.input_matrix @ v,
         running=zeta.T @ Q @ zeta + v.T @ R_eff @ v,
         terminal=problem.P,
+        domain=problem.domain,
     )
 
 
@@ -88,6 +97,7 @@ def against_control(
         rate=problem.drift + problem.input_matrix @ (u_control + w),
         running=attenuated - output_cost(problem, u_control),
         terminal=-terminal,
+        domain=problem.domain,
     )
 
 
@@ -102,20 +112,24 @@ def against_disturbance(problem: Problem, u_disturbance: SX, parameters: SX, ter
         rate=problem.drift + problem.input_matrix @ (w + u_disturbance),
         running=output_cost(problem, w) - attenuated,
         terminal=terminal,
+        domain=problem.domain,
     )
 
 
-def against_known(zeta: SX, w: SX, t: SX, rate: SX, Q: Array, R: Array) -> Stage:
+def against_known(
+    zeta: SX, w: SX, t: SX, rate: SX, Q: Array, R: Array, domain: tuple[Bound, ...] = ()
+) -> Stage:
     """Return the control's problem where all that disturbs is known: L = ζ'Qζ + w'R w and E = 0.
 
     Parameters
     ----------
     zeta, w, t : symbols of the state (n,), the control (k,) and the time, the stage's parameter
     rate : (n,) expression of ζ_dot in them
+    domain : bounds outside of which it has no meaning
     """
     running = zeta.T @ DM(Q) @ zeta + w.T @ DM(R) @ w
     n = int(zeta.shape[0])
-    return Stage(zeta, w, parameters=t, rate=rate, running=running, terminal=np.zeros((n, n)))
+    return Stage(zeta, w, t, rate, running, terminal=np.zeros((n, n)), domain=domain)
 
 
 def output_cost(problem: Problem, u_control: SX) -> SX:

@@ -1,7 +1,8 @@
 """Meshes, collocation points, and trajectories on them."""
 
+from .domain import Domain
 from .gauss import GaussRule
-from .grid import Bent, Grid, Pass, adjoint, backward
+from .grid import ConjugatePoint, Grid, RiccatiPass, adjoint, backward
 from .interpolation import interpolate
 from .mesh import aligned_mesh, extended, graded_mesh, growing_mesh, halved
 from .mesh_settings import CLAIRVOYANT, GrowingMesh, MeshChanges, MeshSettings
@@ -13,16 +14,17 @@ from .verification import reintegrate, sign_changes
 
 __all__ = [
     "CLAIRVOYANT",
-    "Bent",
+    "ConjugatePoint",
+    "Domain",
     "GaussRule",
     "Grid",
     "GrowingMesh",
     "MeshChanges",
     "MeshSettings",
-    "Pass",
     "Plant",
     "Policy",
     "RadauRule",
+    "RiccatiPass",
     "Trajectory",
     "adjoint",
     "aligned_mesh",

@@ -89,7 +89,7 @@ Gains = list[tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
-class Pass:
+class RiccatiPass:
     """A backward pass through stages that are all convex.
 
     Attributes
@@ -110,7 +110,7 @@ class Pass:
 
 
 @dataclass(frozen=True)
-class Bent:
+class ConjugatePoint:
     """A backward pass that met a stage that is not convex: a conjugate point.
 
     Attributes
@@ -139,7 +139,7 @@ class Bent:
 
 def backward(
     grid: Grid, hessian: Array, gradient: Array, P: Array, p: Array, inertia: Array
-) -> Pass | Bent:
+) -> RiccatiPass | ConjugatePoint:
     """Riccati recursion over the stages, from the cost to go p'x + 1/2 x'P x of the end.
 
     Parameters
@@ -158,7 +158,7 @@ def backward(
         factor, failed = lapack.dpotrf(H[n:, n:], lower=1)
         if failed:
             _, vectors = scipy.linalg.eigh(H[n:, n:], np.kron(np.diag(grid.weights[i]), inertia))
-            return Bent(i, vectors[:, 0], gains[::-1])
+            return ConjugatePoint(i, vectors[:, 0], gains[::-1])
         right = np.column_stack([H[n:, :n], g[n:]])
         half, _ = lapack.dtrtrs(factor, right, lower=1)
         answer, _ = lapack.dtrtrs(factor, half, lower=1, trans=1)
@@ -166,7 +166,7 @@ def backward(
         p = g[:n] - half[:, :n].T @ half[:, n]
         promised += 0.5 * float(half[:, n] @ half[:, n])
         gains.append((-answer[:, :n], -answer[:, n]))
-    return Pass(P, p, promised, gains[::-1])
+    return RiccatiPass(P, p, promised, gains[::-1])
 
 
 def adjoint(grid: Grid, gradient: Array, p: Array) -> Array:

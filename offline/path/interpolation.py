@@ -27,10 +27,9 @@ def _lagrange(points: Array, within: Array) -> Array:
     gaps = within[:, None] - points
     exact = gaps == 0.0
     terms = barycentric_weights(points) / np.where(exact, 1.0, gaps)
-    rows = terms / terms.sum(axis=1, keepdims=True)
     hit = exact.any(axis=1)
-    rows[hit] = exact[hit]
-    return np.asarray(rows)
+    terms[hit] = exact[hit]  # before the division: the sum there may be 0
+    return np.asarray(terms / terms.sum(axis=1, keepdims=True))
 
 
 def barycentric_weights(points: Array) -> Array:

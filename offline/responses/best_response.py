@@ -27,6 +27,8 @@ from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import SecondOrder, Stage, against_control, against_disturbance
 from ..path import Trajectory
+from ..settings import OfflineSettings
+from ..solve import solve
 from .neighbour import Feedback, NeighbouringOptimum, feedback_law
 from .response import Guess, Responder, Response, Signal, perturbation
 
@@ -43,7 +45,7 @@ class SaddleGap:
     lower : the least that the control pays against the disturbance's feedback
     disturbance, control : second-order verdicts of the two responses
     upper_starts, lower_starts : (s,) cost reached from the saddle point and from each perturbed start,
-        NaN where IPOPT did not converge
+        NaN where IPOPT did not converge inside the domain
     iterations : of IPOPT, all together
     seconds : wall time
     """
@@ -100,10 +102,12 @@ class BestResponse:
 
         Raises
         ------
+        InputError
+            If the state is not n finite numbers inside the domain.
         RunError
             If a response does not converge from any start, or the path has a conjugate point.
         """
-        started = time.perf_counter()
+        started, zeta0 = time.perf_counter(), self.problem.require_state(zeta0)
         first, second = self._players(path.degree)
         mesh = self._mesh(value, path)
         times = first.times(mesh)
@@ -184,3 +188,26 @@ class BestResponse:
             disturbance, control = (Responder(stage, degree) for stage in self._stages)
             self._responders[degree] = disturbance, control
         return self._responders[degree]
+
+
+def saddle_gap(problem: Problem, zeta0: Array, settings: OfflineSettings | None = None) -> SaddleGap:
+    """Return both players' best responses from one state; `BestResponse` is for many states.
+
+    The path is that of the certified solve.
+
+    Parameters
+    ----------
+    problem : the game on its plant, γ finite
+    zeta0 : (n,) initial state
+    settings : of the certified solve
+
+    Raises
+    ------
+    InputError
+        If the state is not n finite numbers inside the domain.
+    RunError
+        If there is no optimum, a response does not converge from any start, or the path has a conjugate
+        point.
+    """
+    optimum = solve(problem, zeta0, settings).direct
+    return BestResponse(problem).solve(optimum.zeta, optimum.value, optimum.trajectory)

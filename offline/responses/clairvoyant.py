@@ -48,6 +48,7 @@ class Clairvoyant:
         more, and the value is that of degree d
     second_order : whether it is a strict local minimum
     starts : (s,) cost reached from each start on the first mesh, NaN where IPOPT did not converge
+        inside the domain
     rounds : of refinement
     iterations : of IPOPT, all solves together
     seconds : wall time

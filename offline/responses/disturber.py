@@ -1,7 +1,7 @@
 """Maximise what a control policy costs over the disturbance, by collocation, from several starts.
 
-The mesh is aligned with the sign changes of the velocities, and a trajectory that leaves the envelope
-far behind counts as run off.
+The mesh is aligned with the sign changes of the switching functions, and a trajectory that leaves the
+envelope far behind counts as run off.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Disturber:
         fixed: Array | None = None,
         rounds: int = 4,
     ) -> Response:
-        """Return the best maximum, on a mesh aligned with the sign changes of the velocities.
+        """Return the best maximum, on a mesh aligned with the sign changes of switching functions.
 
         Parameters
         ----------

@@ -24,6 +24,7 @@ from ...symbolic.arrays import Array
 from ...symbolic.compiled import dense_function
 from ...symbolic.integration import integrate, runge_kutta_step
 from ..direct import output_cost
+from ..path import Domain
 from .policy import ControlPolicy
 
 
@@ -83,7 +84,7 @@ class GainMeter:
         InputError
             If the energy is not positive.
         RunError
-            If the closed loop is lost under a disturbance of this energy.
+            If the closed loop is lost, or leaves the domain, under a disturbance of this energy.
         """
         if not energy > 0.0:
             raise InputError(f"the energy of a disturbance must be positive, not {energy:g}")
@@ -148,8 +149,8 @@ class GainMeter:
         return dense_function("field", {"y": y, "d": d}, rates)
 
     def _reintegrated(self, disturbance: Array, energy: float) -> tuple[float, float]:
-        """Return gain and reach when scipy integrates the closed loop."""
-        kernel, y, reach = Kernel(self._field), np.zeros(self.problem.n_states + 1), 0.0
+        """Return gain and reach when scipy integrates the closed loop; it must stay in the domain."""
+        kernel, rows = Kernel(self._field), [np.zeros(self.problem.n_states + 1)]
         span = np.array([0.0, self.step])
 
         def rhs(t: float, y: Array) -> Array:
@@ -160,6 +161,8 @@ class GainMeter:
         atol = 1e-10 * np.sqrt(energy)
         for d in disturbance:
             kernel.inputs[1][...] = d
-            y = integrate(rhs, y, span, rtol=1e-8, atol=atol)[-1]
-            reach = max(reach, float(np.abs(y[:-1] / self.problem.scale).max()))
-        return float(np.sqrt(y[-1] / energy)), reach
+            rows.append(integrate(rhs, rows[-1], span, rtol=1e-8, atol=atol)[-1])
+        states, problem = np.array(rows)[:, :-1], self.problem
+        times = np.asarray(self.step * np.arange(len(states)), dtype=np.float64)
+        Domain(problem.zeta, problem.domain).require(times, states)
+        return float(np.sqrt(rows[-1][-1] / energy)), float(np.abs(states / problem.scale).max())

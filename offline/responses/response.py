@@ -29,7 +29,7 @@ class Response:
     cost : what the player minimises
     path : trajectory; its input is the player's
     second_order : whether it is a strict local minimum
-    starts : (s,) cost reached from each start, NaN where IPOPT did not converge
+    starts : (s,) cost reached from each start, NaN where IPOPT did not converge inside the domain
     iterations : of IPOPT, all starts together
     """
 
@@ -85,14 +85,17 @@ class Responder:
         Raises
         ------
         RunError
-            If IPOPT converges from none of them; the message holds its last status.
+            If IPOPT converges inside the domain from none of them; the message says why the last did
+            not.
         """
         program, found, costs = self.program(mesh), list[Optimum](), list[float]()
         failure: RunError | None = None
         for states, inputs in guesses:
             try:
-                found.append(program.solve(zeta0, mesh, states, inputs, parameters))
-                costs.append(found[-1].cost)
+                optimum = program.solve(zeta0, mesh, states, inputs, parameters)
+                self.stage.inside.require(optimum.path.times, optimum.path.states)
+                found.append(optimum)
+                costs.append(optimum.cost)
             except RunError as error:
                 failure = error
                 costs.append(np.nan)

@@ -127,8 +127,8 @@ class ScheduledWorstCase:
         Raises
         ------
         InputError
-            If the state is not finite, of the wrong shape or pitched by 90 degrees, or the schedule
-            has not as many weights as the basis.
+            If the state is not n finite numbers inside the domain, or the schedule has not as many
+            weights as the basis.
         """
         started, disturber = time.perf_counter(), self._disturber
         zeta0 = self.problem.require_state(zeta0)

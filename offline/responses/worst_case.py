@@ -11,9 +11,9 @@ of the linearised closed loop. Where that has no solution the linearised closed 
 there are small disturbances that bring it from rest back to rest at a profit, and repeating them costs
 any amount. Otherwise the maximiser may still run off in the nonlinear plant, and this is looked for.
 
-The local maximum that is reported is the best of several starts. Mesh points are put where velocities
-change sign, scipy integrates the closed loop again under the disturbance that was found, and the
-second-order condition is checked.
+The local maximum that is reported is the best of several starts. Mesh points are put where switching
+functions change sign, scipy integrates the closed loop again under the disturbance that was found, and
+the second-order condition is checked.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from typing import Unpack
 import numpy as np
 from casadi import SX
 
-from ...symbolic import RunError
+from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import SecondOrder, against_control
 from ..path import MeshChanges, MeshSettings, Trajectory
 from .disturber import ByInterval, Disturber
-from .policy import ControlPolicy
+from .policy import ControlPolicy, linear_policy
 from .response import Response
 
 
@@ -47,7 +47,7 @@ class WorstCase:
     second_order : whether it is a strict local maximum; None where unbounded
     reintegrated : the cost when scipy integrates the closed loop under that disturbance
     reach : largest excursion of a state, in half-widths
-    starts : (s,) cost reached from each start, NaN where IPOPT did not converge
+    starts : (s,) cost reached from each start, NaN where IPOPT did not converge inside the domain
     output_energy, disturbance_energy : ∫ |z|^2 dt, the rest included, and ∫ d'W_d d dt
     iterations : of IPOPT, all together
     seconds : wall time
@@ -119,7 +119,7 @@ class WorstCaseSolver:
         Raises
         ------
         InputError
-            If the state is not finite, of the wrong shape or pitched by 90 degrees.
+            If the state is not n finite numbers inside the domain.
         """
         started = time.perf_counter()
         zeta0 = self.problem.require_state(zeta0)
@@ -177,6 +177,24 @@ class WorstCaseSolver:
         level = np.array([self._level])
         guesses = self._disturber.guesses(zeta0, mesh, lambda t: level)
         return self._disturber.maximise(zeta0, mesh, guesses, _constant(self._level))
+
+
+def worst_case(problem: Problem, zeta0: Array, u_control: SX | None = None) -> WorstCase:
+    """Return the worst case of a control policy from one state; `WorstCaseSolver` is for many states.
+
+    Parameters
+    ----------
+    problem : the game on its plant, γ finite
+    zeta0 : (n,) initial state
+    u_control : (k,) expression of the problem's ζ; None for the linear H-infinity policy
+
+    Raises
+    ------
+    InputError
+        If the policy is none, or the state is not n finite numbers inside the domain.
+    """
+    policy = linear_policy(problem) if u_control is None else u_control
+    return WorstCaseSolver(ControlPolicy(problem, policy)).solve(zeta0)
 
 
 def measured(

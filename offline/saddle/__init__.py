@@ -1,6 +1,6 @@
 """The saddle point by Pontryagin's equations, and the value against γ."""
 
-from .gamma_curve import GammaCurve, GammaCurveSolver, GammaPoint, value_against_gamma
+from .gamma import GammaCurve, GammaCurveSolver, GammaPoint, gamma_curve
 from .saddle import SaddleSolution, SaddleSolver
 
 __all__ = [
@@ -9,5 +9,5 @@ __all__ = [
     "GammaPoint",
     "SaddleSolution",
     "SaddleSolver",
-    "value_against_gamma",
+    "gamma_curve",
 ]

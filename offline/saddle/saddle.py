@@ -18,7 +18,7 @@ import numpy as np
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
-from ..path import GaussRule, MeshChanges, MeshSettings, Plant, interpolate, settle
+from ..path import Domain, GaussRule, MeshChanges, MeshSettings, Plant, interpolate, settle
 from .boundary import BoundaryProblem, Unknowns
 from .extremal_field import ExtremalField
 
@@ -101,6 +101,7 @@ class SaddleSolver:
         self.rule = GaussRule(self.settings.degree)
         self.mesh = self.settings.points
         self.plant = Plant(problem)
+        self.domain = Domain(problem.zeta, problem.domain)
         self._field = ExtremalField(problem, compiled=compiled)
         self._boundary = BoundaryProblem(problem, self._field, self.rule)
 
@@ -132,9 +133,10 @@ class SaddleSolver:
         Raises
         ------
         InputError
-            If the state is not finite, of the wrong shape or pitched by 90 degrees.
+            If the state is not n finite numbers inside the domain.
         RunError
-            If continuation in the initial state needs steps below a thousandth.
+            If continuation in the initial state needs steps below a thousandth, or the saddle point's
+            trajectory leaves the domain.
         """
         zeta0 = self.problem.require_state(zeta0)
         mesh = self.mesh if mesh is None else mesh
@@ -155,10 +157,10 @@ class SaddleSolver:
         tolerance: float = 1e-6,
         rounds: int = 6,
     ) -> tuple[SaddleSolution, Array]:
-        """Return the saddle point on a mesh aligned with the velocity sign changes, and their times.
+        """Return the saddle point on a mesh with points at its sign changes, and their times.
 
-        The sign changes are those of its own trajectory: solve, locate them, put mesh points on them,
-        and repeat until they move by less than `tolerance` [s]. Raises as `solve`.
+        They are those of the switching functions along its own trajectory. The mesh is settled on them
+        to `tolerance` [s] in as many `rounds` at most; see `settle`. Raises as `solve`.
         """
         solutions, events = settle(
             self.plant,
@@ -231,6 +233,8 @@ class SaddleSolver:
         along = np.concatenate([unknowns.ends[:-1, None], unknowns.points], axis=1)
         path = np.vstack([along.reshape(K * (d + 1), -1), unknowns.ends[-1:]])
         times = np.column_stack([mesh[:-1], self.rule.times(mesh)]).ravel()
+        times = np.append(times, mesh[-1])
+        self.domain.require(times, path[:, :n])
         u_1, u_2 = unknowns.control, unknowns.disturbance
         local = game.local_cost(unknowns.points[..., :n], u_1, u_2)
         end = unknowns.ends[-1, :n]
@@ -245,7 +249,7 @@ class SaddleSolver:
             costate=unknowns.ends[0, n:],
             slope=slope,
             mesh=mesh,
-            times=np.append(times, mesh[-1]),
+            times=times,
             states=path[:, :n],
             costates=path[:, n:],
             u_control=u_1.reshape(K * d, -1),

@@ -1,6 +1,6 @@
 """The zero-sum game (4)-(9): weights, Riccati equation, and the problem of a game on a plant."""
 
-from .domain import Bound, require_numbers
+from .domain import Bound, margins_and_shown, outside, require_numbers
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import InverseDynamics, Problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
@@ -15,6 +15,8 @@ __all__ = [
     "gamma_hamiltonian",
     "gamma_star",
     "gamma_threshold",
+    "margins_and_shown",
+    "outside",
     "problem_from_data",
     "problem_to_data",
     "require_numbers",

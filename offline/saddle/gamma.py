@@ -20,6 +20,7 @@ from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ...symbolic.game import gamma_threshold
 from ..path import MeshSettings
+from ..settings import OfflineSettings, horizon_of
 from .saddle import SaddleSolution, SaddleSolver
 
 # time constants of the slowest mode within the horizon; what is left is of third order, e^-30
@@ -112,7 +113,7 @@ class GammaCurveSolver:
         Raises
         ------
         InputError
-            If the state is not finite, of the wrong shape or pitched by 90 degrees.
+            If the state is not n finite numbers inside the domain.
         """
         zeta0 = self.problem.require_state(zeta0)
         undisturbed, start = self._point(self._undisturbed, zeta0, None)
@@ -142,8 +143,25 @@ def default_gammas(problem: Problem) -> list[float]:
     return [float(threshold * (1.0 + x)) for x in np.geomspace(0.05, 9.0, 12)]
 
 
-def value_against_gamma(
-    problem: Problem, zeta0: Array, gammas: Sequence[float] | None = None
+def gamma_curve(
+    problem: Problem,
+    zeta0: Array,
+    gammas: Sequence[float] | None = None,
+    settings: OfflineSettings | None = None,
 ) -> GammaCurve:
-    """Return the curve of a game from one state; see `GammaCurveSolver`, also for many states."""
-    return GammaCurveSolver(problem, gammas).solve(zeta0)
+    """Return the curve of a game from one state; `GammaCurveSolver` is for many states.
+
+    Parameters
+    ----------
+    problem : the game on its plant; its own γ plays a part in the horizon alone
+    zeta0 : (n,) initial state
+    gammas : finite levels; None for 12 whose distances to the threshold grow geometrically
+    settings : of the certified solve, whose horizon the curve shares
+
+    Raises
+    ------
+    InputError
+        As `GammaCurveSolver` and its `solve`.
+    """
+    horizon = horizon_of(problem, OfflineSettings() if settings is None else settings)
+    return GammaCurveSolver(problem, gammas, horizon=horizon).solve(zeta0)
