@@ -125,6 +125,10 @@ def test_runs_that_fail_are_rows_with_their_reason(user_folder: Path, capsys: Ca
         assert "at t = " in row["reason"]
         assert load(user_folder / "out" / row["record"]).attrs["stopped"] == row["reason"]
     assert told["failed"] == 6
+    for group in told["summary"]:
+        regret = group["regret"]
+        assert (regret["median"] is None) == ("note" in regret) == (group["failed"] > 0), group
+        assert regret["diverged"] == (group["failed"] if group["settings"]["game.gamma"] > 1 else 0)
     again = call(capsys, *WORDS, *words)
     assert (again.code, again.json()["resumed"]) == (1, 8), "they would fail so again"
 

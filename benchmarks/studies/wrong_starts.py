@@ -103,7 +103,8 @@ def shares(rows: list[Row]) -> str:
 
 def zero_cases() -> dict[str, Case]:
     """Return what is tried from zero weights, by the basis' name and what holds them."""
-    zero, bellman = {"weight_factor": 0.0}, {"error": "bellman", "safeguard": False, "leash": 0.0}
+    zero: dict[str, Any] = {"weight_factor": 0.0}
+    bellman = {"error": "bellman", "safeguard": False, "leash": 0.0}
     slow = {"gain_actor_1": 2.0, "gain_actor_2": 2.0, "forgetting": 2.0}
     ways = {
         "costate, safeguard": ("learned", zero),

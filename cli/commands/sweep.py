@@ -116,9 +116,9 @@ def _print(answer: dict[str, Any], scenario: Scenario) -> None:
     )
 
 
-def _forms(values: dict[str, float | None] | None, factor: float, form: str, unit: str) -> str:
+def _forms(values: dict[str, Any] | None, factor: float, form: str, unit: str) -> str:
     shown = [None if values is None else values[name] for name in QUANTILES]
-    if all(value is None for value in shown):
+    if all(one is None for one in shown) and not (values or {}).get("diverged"):
         return "–"
     return " / ".join("∞" if one is None else f"{factor * one:{form}}" for one in shown) + unit
 
