@@ -128,14 +128,16 @@ class GameOptimum(Reference):
         learned, linear = (np.inf if regrets is None else regrets[name].median for name in TWO)
         if not np.isfinite([learned, linear]).all():
             return "A run ended early, so there is no regret to compare."
+        states = "" if len(self.optima) == 1 else f" (median of {len(self.optima)} states)"
+        told = (
+            f"The learned policy costs {100 * learned:.3f} % more than the optimum{states}; the linear "
+            f"H-infinity policy, which learns nothing, {100 * linear:.2f} %"
+        )
+        if linear <= 0.0:  # nothing was left to learn
+            return f"{told}."
         change = 100 * (learned - linear) / linear
         outcome = f"takes {-change:.0f} % off" if change < 0 else f"adds {change:.0f} % to"
-        states = "" if len(self.optima) == 1 else f" (median of {len(self.optima)} states)"
-        return (
-            f"The learned policy costs {100 * learned:.3f} % more than the optimum{states}; the linear "
-            f"H-infinity policy, which learns nothing, {100 * linear:.2f} %: learning {outcome} the "
-            "excess."
-        )
+        return f"{told}: learning {outcome} the excess."
 
 
 class ClairvoyantOptimum(Reference):
