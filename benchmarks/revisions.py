@@ -40,7 +40,8 @@ def print_numbers(both: Sequence[Revision]) -> bool:
     print(f"{'results':<28}{'numbers':>12}{'differ':>10}{'largest, relative':>20}  where")
     sentences, equal, total = [], True, 0
     for name in COMMANDS:
-        sentences += [text for revision in both if (text := fault(revision, name))]
+        faults = [text for revision in both if (text := fault(revision, name))]
+        sentences += faults
         old, new = (numbers(revision, name) for revision in both)
         for kind in old | new:
             found = compare(old.get(kind, {}), new.get(kind, {}))
@@ -48,13 +49,12 @@ def print_numbers(both: Sequence[Revision]) -> bool:
                 f"{f'{name}, {kind}':<28}{found.compared:>12,}{found.differing:>10,}"
                 f"{found.largest:>20.1e}  {found.where}"
             )
-            sentences += _lacking(f"{name}, {kind}", found)
+            sentences += [] if faults else _lacking(f"{name}, {kind}", found)
             equal = equal and not (found.differing or found.only_old)
             total += found.compared
     print("\n".join(sentences), end="\n" if sentences else "")
-    print(
-        f"{total:,} numbers compared: {'all are equal' if equal else 'not all are equal'}", flush=True
-    )
+    verdict = "all are equal" if equal else "not all are equal, or some are missing in NEW"
+    print(f"{total:,} numbers compared: {verdict}", flush=True)
     return equal
 
 

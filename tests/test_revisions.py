@@ -70,9 +70,15 @@ def test_renamed_names_are_compared_and_others_are_told() -> None:
     assert (found.compared, found.differing, found.largest) == (1, 1, 0.5)
     assert found.only_old == ["gone.nc"]
     assert found.only_new == ["a.json: more"]
-    found = differences.compare(old, new)
+    found = differences.compare(old, new)  # "defect" is not said to be "gap"
     assert found.compared == 0
-    assert found.only_old == ["a.json: states.0.defect", "gone.nc"]
+    assert found.only_old == ["gone.nc", "a.json: states.0.defect"]
+
+
+def test_what_many_files_lack_is_told_once() -> None:
+    old = {(file, name): np.ones(1) for file in ("a.nc", "b.nc") for name in ("cost", "zeta", "u")}
+    new = {name: values for name, values in old.items() if name[1] == "u" or name == ("a.nc", "zeta")}
+    assert differences.compare(old, new).only_old == ["cost in 2 files", "b.nc: zeta"]
 
 
 def test_excluded_names_are_not_compared() -> None:

@@ -104,9 +104,16 @@ def distance(old: Values, new: Values) -> tuple[int, float]:
 
 def only_in(some: Mapping[Name, Values], others: Mapping[Name, Values]) -> list[str]:
     """Return the names that only `some` have; of a file that the others lack, the file alone."""
-    files = {name[0] for name in others}
+    known = {name[0] for name in others}
     missing = [name for name in some if name not in others]
-    return list(dict.fromkeys(told(name) if name[0] in files else name[0] for name in missing))
+    gone = dict.fromkeys(name[0] for name in missing if name[0] not in known)
+    files: dict[Name, list[str]] = {}
+    for file, *entry in (name for name in missing if name[0] in known):
+        files.setdefault(tuple(entry), []).append(file)
+    return [*gone] + [
+        f"{'.'.join(entry)} in {len(those)} files" if len(those) > 1 else told((those[0], *entry))
+        for entry, those in files.items()
+    ]
 
 
 def told(name: Name) -> str:
