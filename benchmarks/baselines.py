@@ -23,10 +23,11 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import GameValue, Regret, RunMetrics, run_metrics
+from stationkeep.comparison.merit import Regret, RunMetrics, run_metrics
 from stationkeep.comparison.policies import CONTENDERS
 from stationkeep.comparison.policies.mpc import ModelPredictive, PredictionSettings
 from stationkeep.comparison.records import online_record
+from stationkeep.offline import QuickValue
 from stationkeep.online import Policy, draw_samples
 from stationkeep.online.records import write_text
 
@@ -52,7 +53,7 @@ def undisturbed(scenario: Scenario, n_states: int) -> list[dict[str, Any]]:
     """Print and return the table."""
     station = scenario.station_keeping()
     states = draw_samples(station.envelope, n_states, scenario.simulation.seed)
-    value = GameValue(station)
+    value = QuickValue(station.problem)
     optima = [value(state) for state in states]
     header = (
         f"{'policy':<24}{'regret [%]: median':>19}{'90 %':>7}{'max':>7}{'failed':>8}{'rms [m]':>9}"

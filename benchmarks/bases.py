@@ -30,12 +30,13 @@ from pathlib import Path
 import numpy as np
 from regret import SEED
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import FINE, GameValue, Regret, game_cost
+from stationkeep.comparison.merit import Regret, game_cost
 from stationkeep.comparison.merit import regret as regret_of
 from stationkeep.comparison.optima import fit, ideal_record
 from stationkeep.comparison.optima.ideal import Fit
 from stationkeep.comparison.policies import LinearPolicy, OnVehicle
-from stationkeep.offline import ErrorSize, OfflineSolver, Pairs
+from stationkeep.offline import ErrorSize, OfflineSolver, Pairs, QuickValue
+from stationkeep.offline.path import MeshSettings
 from stationkeep.online import Controller, History, draw_samples, run, save
 from stationkeep.symbolic import RunError
 from studies.cases import Case, finished
@@ -58,7 +59,7 @@ class Reference:
         station = scenario.station_keeping()
         solver = OfflineSolver(station.problem, scenario.offline)
         self.states = draw_samples(station.envelope, n_states, SEED)
-        quick = GameValue(station, FINE)
+        quick = QuickValue(station.problem, MeshSettings.fine)
         found = [quick.solution(z) for z in self.states]
         self.values = np.array([solution.value for solution in found])
         kept = []

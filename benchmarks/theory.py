@@ -14,7 +14,6 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 from stationkeep.comparison import Condition, Scenario
-from stationkeep.comparison.merit import GameValue
 from stationkeep.comparison.optima import HELD_OUT, Bounds, Ideal, fit
 from stationkeep.comparison.policies import contender
 from stationkeep.comparison.records import contender_record
@@ -23,7 +22,7 @@ from stationkeep.comparison.study.game_run import game_run
 from stationkeep.comparison.theory import run_conditions, scenario_conditions, theory
 from stationkeep.comparison.theory.exact_basis import exact_bound
 from stationkeep.comparison.theory.uub import Gains, Knowledge, constants, distance, lyapunov, measure
-from stationkeep.offline import Pairs
+from stationkeep.offline import Pairs, QuickValue
 from stationkeep.online import Learner, LearnerSettings, draw_samples, rank_margin
 from stationkeep.online.paper import BellmanTerms, bellman_error
 from stationkeep.symbolic import Basis, ValueFunctions, quadratic, two_state_game
@@ -52,7 +51,7 @@ def margins(folder: Path) -> None:
 def ideal_weights(scenario: Scenario, n_states: int, held_out: int) -> Ideal:
     """Return ideal weights fitted to optima of the envelope, with their errors at others."""
     station, seed = scenario.station_keeping(), scenario.simulation.seed
-    value = GameValue(station)
+    value = QuickValue(station.problem)
     training = optimal_pairs(station, value, n_states, seed)
     others = optimal_pairs(station, value, held_out, seed, HELD_OUT)
     found = fit(station, training, others)

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import GameValue, run_metrics
+from stationkeep.comparison.merit import run_metrics
 from stationkeep.comparison.records import contender_record
 from stationkeep.comparison.sweep.vary import varied
+from stationkeep.offline import QuickValue
 from stationkeep.online import draw_samples, load
 
 from .commands import QUICK, call, files_in, sets
@@ -54,7 +55,7 @@ def test_rows_are_the_runs_that_were_asked_for(user_folder: Path, capsys: Captur
         )
         assert row["policy"] == ("learned", "linear")[i % 2]
         record, station = contender_record(one, row["policy"]), one.station_keeping()
-        optimum = GameValue(station)(zeta)
+        optimum = QuickValue(station.problem)(zeta)
         metrics = run_metrics(record, station, optimum)
         assert row["optimum"] == optimum
         for name in ("cost", "regret", "position_rms", "energy", "effort", "rest_share"):

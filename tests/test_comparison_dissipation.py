@@ -17,8 +17,8 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import GameValue, dissipation_margin
-from stationkeep.offline import DirectSolver
+from stationkeep.comparison.merit import dissipation_margin
+from stationkeep.offline import DirectSolver, QuickValue
 from stationkeep.online import build_disturbance, draw_samples, run, to_dataset
 from stationkeep.online.loop import PlantState
 from stationkeep.online.vehicle import HeldPlant
@@ -130,7 +130,7 @@ def test_dissipation_of_the_learner(kind: str) -> None:
     """Margins are positive from rest, from the shipped start and from the far envelope."""
     shipped = Scenario.load("bluerov2-heavy")
     station = shipped.station_keeping()
-    value = GameValue(station)
+    value = QuickValue(station.problem)
     starts = [np.zeros(12), shipped.initial_state, draw_samples(station.half_widths, 1, 5)[0]]
     for seed, start in enumerate(starts):
         disturbance = {

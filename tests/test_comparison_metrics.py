@@ -10,8 +10,6 @@ import xarray as xr
 from casadi import collocation_points
 from scipy.integrate import quad, solve_ivp, trapezoid
 from stationkeep.comparison.merit import (
-    FINE,
-    GameValue,
     Regret,
     cost_to_date,
     dissipation_margin,
@@ -21,7 +19,8 @@ from stationkeep.comparison.merit import (
 )
 from stationkeep.comparison.merit.metrics import energy, peak_thrust
 from stationkeep.comparison.records import online_record, optimal_record
-from stationkeep.offline import OfflineSolver, Trajectory
+from stationkeep.offline import OfflineSolver, QuickValue, Trajectory
+from stationkeep.offline.path import MeshSettings
 from stationkeep.online import run, to_dataset
 from stationkeep.symbolic import Setup, Vehicle
 
@@ -162,21 +161,21 @@ def test_a_problem_that_is_no_vehicle() -> None:
     for name in ("position_rms", "excursion", "effort", "energy", "saturated", "peak_thrust"):
         assert getattr(metrics, name) is None, name
     assert run_metrics(record, setup, value / 2.0).regret == pytest.approx(1.0)
-    assert GameValue(setup)(start) == pytest.approx(value, rel=1e-6)
+    assert QuickValue(setup.problem)(start) == pytest.approx(value, rel=1e-6)
 
 
 @pytest.mark.parametrize(("zeta", "value"), [(FAR_STATE, FAR_VALUE), (FAST_STATE, FAST_VALUE)])
 def test_error_of_the_value(zeta: Array, value: float) -> None:
     """A fast state is the harder one: its velocities change sign nine times within the mesh."""
-    station = quick_scenario().station_keeping()
-    errors = [abs(GameValue(station, n)(zeta) / value - 1.0) for n in (16, FINE)]
+    problem, meshes = quick_scenario().setup().problem, (MeshSettings.quick, MeshSettings.fine)
+    errors = [abs(QuickValue(problem, mesh)(zeta) / value - 1.0) for mesh in meshes]
     assert errors[0] < 4e-6
     assert errors[1] < 8e-7
     assert errors[1] < errors[0]
 
 
 def test_the_last_value_is_remembered() -> None:
-    value = GameValue(quick_scenario().station_keeping())
+    value = QuickValue(quick_scenario().station_keeping().problem)
     zeta = quick_scenario().initial_state
     found = value.solution(zeta)
     assert value.solution(zeta.copy()) is found
@@ -237,7 +236,7 @@ def test_dissipation_from_rest() -> None:
     """From V(0) = 0 the L2 gain is below γ: what is spent and stored is less than γ^2 ∫ d'W_d d."""
     record, station = disturbed(), quick_scenario().station_keeping()
     assert record.attrs["stopped"] == ""
-    value, zeta = GameValue(station), record["zeta"].values
+    value, zeta = QuickValue(station.problem), record["zeta"].values
     assert value(zeta[0]) == 0.0
     margin = dissipation_margin(record, 0.0, value(zeta[-1]))
     assert margin > 0.0
@@ -257,8 +256,8 @@ def test_dissipation_from_a_state() -> None:
     station = scenario.station_keeping()
     record = online_record(scenario, policy=lambda: linear_on(station), kind="linear")
     start = float(optimum().attrs["value"])
-    assert GameValue(station)(scenario.initial_state) == pytest.approx(start, rel=1e-5)
-    end = GameValue(station)(record["zeta"].values[-1])
+    assert QuickValue(station.problem)(scenario.initial_state) == pytest.approx(start, rel=1e-5)
+    end = QuickValue(station.problem)(record["zeta"].values[-1])
     margin = dissipation_margin(record, start, end)
     assert margin > 0.0
     assert dissipation_margin(record, start + 1.0, end) - margin == pytest.approx(1.0)

@@ -10,7 +10,7 @@ from stationkeep.symbolic import InputError
 from .games import FAR_STATE, linear_quadratic, two_state
 
 
-@pytest.mark.parametrize("settings", [MeshSettings.quick, MeshSettings.regret])
+@pytest.mark.parametrize("settings", [MeshSettings.quick, MeshSettings.fine])
 def test_quick_value_of_the_two_state_game(settings: MeshSettings) -> None:
     """V* = ζ_1^2 / 2 + ζ_2^2."""
     quick = QuickValue(two_state()[0], settings)

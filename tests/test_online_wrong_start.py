@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import GameValue
+from stationkeep.offline import QuickValue
 from stationkeep.online import Controller, Learner, LearnerSettings, draw_samples
 from stationkeep.symbolic import InputError, Model, Vehicle
 from studies.cases import Case
@@ -244,7 +244,7 @@ def test_a_lesson_is_a_run_and_what_it_remembered(tmp_path: Path) -> None:
     assert taught.path.stat().st_mtime_ns == written
     np.testing.assert_array_equal(again.weights, taught.weights)
     states = draw_samples(station.envelope, 3, 8)
-    optimum = GameValue(station)
+    optimum = QuickValue(station.problem)
     medians = remembered_regret(scenario, taught, states, np.array([optimum(z) for z in states]))
     assert medians[-1] < medians[0]
     assert np.all(medians > 0.0)

@@ -23,10 +23,11 @@ from collections.abc import Callable
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import GameValue, run_metrics
+from stationkeep.comparison.merit import run_metrics
 from stationkeep.comparison.policies import CONTENDERS
 from stationkeep.comparison.policies.mpc import ModelPredictive, PredictionSettings
 from stationkeep.comparison.records import online_record
+from stationkeep.offline import QuickValue
 from stationkeep.online import AS_PRINTED, Controller, Learner, Policy, draw_samples, run
 from stationkeep.online.laws import row_weights
 from stationkeep.symbolic import Kernel, Model, StationKeeping, ValueFunctions
@@ -174,7 +175,7 @@ def predictive_control() -> None:
     """Print regret and time a control step of learned, linear and predictive policies, from afar."""
     scenario = Scenario.load().with_settings(simulation={"initial_state": FAR})
     station = scenario.station_keeping()
-    optimum = GameValue(station)(np.array(FAR))
+    optimum = QuickValue(station.problem)(np.array(FAR))
     makers: dict[str, Callable[[], Policy]] = {
         "learned": lambda: Controller(scenario),
         "linear H-infinity": lambda: CONTENDERS["linear"].make(scenario),

@@ -12,11 +12,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from stationkeep.comparison.merit import FINE, GameValue, finite, game_cost, regret
+from stationkeep.comparison.merit import finite, game_cost, regret
 from stationkeep.comparison.parallel import Work
 from stationkeep.comparison.policies import AnyPolicy, contender
 from stationkeep.comparison.records import closed_loop, provenance
 from stationkeep.comparison.scenario import Scenario
+from stationkeep.offline import QuickValue
+from stationkeep.offline.path import MeshSettings
 from stationkeep.online import Controller, History
 from stationkeep.symbolic import RunError
 from stationkeep.symbolic.arrays import Array
@@ -111,7 +113,7 @@ def _worker(shipment: tuple[Scenario, tuple[Case, ...]]) -> Work[Task, Result]:
     """Build solver and scenarios once; return what runs one case from one state."""
     scenario, cases = shipment
     station = scenario.station_keeping()
-    optimum = GameValue(station, FINE)
+    optimum = QuickValue(station.problem, MeshSettings.fine)
     scenarios = [case.scenario(scenario) for case in cases]
 
     def work(task: Task) -> Iterator[Result]:

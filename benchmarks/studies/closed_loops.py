@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import GameValue, dissipation_margin, run_metrics
+from stationkeep.comparison.merit import dissipation_margin, run_metrics
 from stationkeep.comparison.parallel import Work
 from stationkeep.comparison.records import contender_record, provenance
+from stationkeep.offline import QuickValue
 from stationkeep.symbolic import RunError
 
 from .kept import Keep, key_of
@@ -70,7 +71,7 @@ def _told(there: int, made: int, total: int) -> None:
 
 
 def _worker(scenario: Scenario) -> Work[Run, Row]:
-    value = GameValue(scenario.station_keeping())
+    value = QuickValue(scenario.station_keeping().problem)
 
     def work(one: Run) -> Iterator[Row]:
         changed = scenario.with_settings(simulation=one.changes)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from stationkeep.comparison.parallel import S, T, Work, run_tasks
+from stationkeep.comparison.records import key_of as records_key_of
 from stationkeep.symbolic import InputError
 
 Result = dict[str, Any]
@@ -98,7 +99,7 @@ class Keep:
 
 def key_of(*parts: object) -> str:
     """Return the hash of what a result depends on, our own sources among it."""
-    return hashlib.sha256("\0".join([sources(), *map(str, parts)]).encode()).hexdigest()
+    return records_key_of(sources(), *map(str, parts))
 
 
 @cache

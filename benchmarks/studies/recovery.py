@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from stationkeep.comparison.merit import FINE, GameValue, Regret, regret
+from stationkeep.comparison.merit import Regret, regret
 from stationkeep.comparison.parallel import Work
 from stationkeep.comparison.records import provenance
 from stationkeep.comparison.scenario import Scenario
+from stationkeep.offline import QuickValue
+from stationkeep.offline.path import MeshSettings
 from stationkeep.online import Controller, run
 from stationkeep.online.paper import BellmanTerms, bellman_error
 from stationkeep.online.records import write_text
@@ -148,7 +150,7 @@ class _Beside:
 
 def _worker(shipment: tuple[Scenario, Case]) -> Work[Array, Result]:
     scenario, case = shipment
-    optimum = GameValue(scenario.station_keeping(), FINE)
+    optimum = QuickValue(scenario.station_keeping().problem, MeshSettings.fine)
     wrong = case.scenario(scenario)
 
     def work(zeta: Array) -> Iterator[Result]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import GameValue
+from stationkeep.offline import QuickValue
 from stationkeep.online import draw_samples
 from stationkeep.symbolic import Vehicle
 
@@ -53,7 +53,7 @@ def corner_runs(scenario: Scenario, options: argparse.Namespace) -> tuple[str, l
     """The corners of the envelope from which the optimum goes farthest, of 1000 seeded ones."""
     problem = scenario.station_keeping().problem
     signs = np.random.default_rng(SEED).choice([-1.0, 1.0], (1000, 12))
-    value = GameValue(scenario.station_keeping())
+    value = QuickValue(scenario.station_keeping().problem)
 
     def peak(state: Array) -> float:
         path = value.solution(state).trajectory

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from casadi import DM
-from stationkeep.comparison.merit import GameValue, regret
+from stationkeep.comparison.merit import regret
 from stationkeep.comparison.policies import LQR, LinearPolicy, OnVehicle
 from stationkeep.comparison.scenario import Scenario
 from stationkeep.offline import (
     ControlPolicy,
+    QuickValue,
     ScheduledWorstCase,
     Trajectory,
     WeightSchedule,
@@ -93,7 +94,7 @@ class WorstCases:
         self.station = self.scenario.station_keeping()
         self.remembered, self.probes, self.seed = remembered, probes, seed
         problem, basis, horizon = self.station.problem, self.station.basis, scenario.simulation.duration
-        self._value = GameValue(self.station)
+        self._value = QuickValue(self.station.problem)
         lqr = DM(-LQR(self.station.problem).gain) @ problem.zeta
         self._linear, self._lqr = (
             WorstCaseSolver(ControlPolicy(problem, policy), reach=REACH)

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 from stationkeep.comparison import Scenario
-from stationkeep.comparison.merit import FINE, GameValue, Regret, regret
+from stationkeep.comparison.merit import Regret, regret
 from stationkeep.comparison.study.excitation import PLAIN, excitation_run
+from stationkeep.offline import QuickValue
+from stationkeep.offline.path import MeshSettings
 from stationkeep.online import draw_samples, run
 from stationkeep.symbolic import Basis, Problem, ValueFunctions, quadratic
 from stationkeep.symbolic.arrays import Array
@@ -63,7 +65,7 @@ def print_starts(scenario: Scenario, states: Array, start: Array, folder: Path, 
     words = {name: name for name in names} | {"tf": "t frozen", "to": "t online"}
     scale, n = scenario.envelope.scale, len(states)
     print(HEADER.format(n=n, scale=scale, within=WITHIN, watched=WATCHED, **words), flush=True)
-    optimum = GameValue(scenario.station_keeping(), FINE)
+    optimum = QuickValue(scenario.station_keeping().problem, MeshSettings.fine)
     optima = np.array([optimum(zeta) for zeta in states])
     limit = np.inf
     for name, settings in wrong_starts(scenario, folder).items():

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...comparison.merit import GameValue, dissipation_margin, run_metrics
+from ...comparison.merit import dissipation_margin, run_metrics
 from ...comparison.records import online_record
+from ...offline import QuickValue
 from ...symbolic import RunError, Setup
 from ..output import load_scenario, output_folder, print_json, print_table, progress
 
@@ -53,7 +54,7 @@ def _margin(record: xr.Dataset, station: Setup) -> float | None:
     zeta = record["zeta"].values
     if not len(zeta):
         return None
-    value = GameValue(station)
+    value = QuickValue(station.problem)
     try:
         return dissipation_margin(record, value(zeta[0]), value(zeta[-1]))
     except RunError:

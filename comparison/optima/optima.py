@@ -14,10 +14,9 @@ import numpy as np
 from ...offline import Certificate, OfflineSolver, Plant
 from ...online import load, save
 from ...online.records import read_parts, remove_temporaries
-from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ..parallel import Work, run_tasks
-from ..records import optimum_or_failure, optimum_provenance, trajectory_of
+from ..records import kept_key, optimum_or_failure, optimum_provenance, trajectory_of
 from ..scenario import Scenario
 from .plan import Step, plan
 
@@ -144,7 +143,7 @@ def _worker(shipment: tuple[Scenario, Path]) -> Work[Chunk, tuple[int, bool]]:
         for step, zeta in chunk:
             path, (guess, guess_key) = record_path(folder, step.state), _start(folder, step, before)
             attributes = optimum_provenance(scenario, zeta, guess_key)
-            fresh = _key(path) != attributes["key"]
+            fresh = kept_key(path) != attributes["key"]
             if fresh:
                 trajectory = None if guess is None else trajectory_of(load(guess))
                 save(optimum_or_failure(scenario, solver, zeta, attributes, trajectory), path)
@@ -163,10 +162,3 @@ def _start(folder: Path, step: Step, before: dict[int, int | None]) -> tuple[Pat
             return path, str(attributes["key"])
         state = before[state]
     return None, ""
-
-
-def _key(path: Path) -> str:
-    try:
-        return str(read_parts(path)[0].get("key", ""))
-    except InputError:
-        return ""  # not there, or it can't be read

@@ -1,22 +1,19 @@
 """Runs and optima as records that are kept, and run again from what they hold alone."""
 
 from .clairvoyant import KIND, clairvoyant_record, optimum_name
+from .provenance import FORMAT, OFFLINE_KEY, model_text, provenance
 from .recorded import recorded_scenario
 from .replay import BIT_EQUAL, DIFFERENT, Replay, replay
 from .running import closed_loop
 from .runs import (
-    FORMAT,
-    OFFLINE_KEY,
     contender_record,
-    model_text,
     online_record,
     optimal_record,
     optimum_or_failure,
     optimum_provenance,
-    provenance,
-    reused,
     trajectory_of,
 )
+from .store import kept_key, key_of, reused
 
 __all__ = [
     "BIT_EQUAL",
@@ -28,6 +25,8 @@ __all__ = [
     "clairvoyant_record",
     "closed_loop",
     "contender_record",
+    "kept_key",
+    "key_of",
     "model_text",
     "online_record",
     "optimal_record",

@@ -38,7 +38,9 @@ from ...symbolic.integration import integrate
 from ...symbolic.underwater import jacobian
 from ..policies import LQR
 from ..scenario import Scenario
-from .runs import failure_record, path_dataset, provenance, reused
+from .provenance import provenance
+from .runs import failure_record, path_dataset
+from .store import reused
 
 KIND = "clairvoyant"
 LARGEST_ERROR = 1e-3  # relative, of a value that counts as found

@@ -19,8 +19,9 @@ from ..policies import CONTENDERS
 from ..scenario import Scenario, restored
 from .clairvoyant import KIND as CLAIRVOYANT
 from .clairvoyant import clairvoyant_or_failure, clairvoyant_provenance
+from .provenance import FORMAT
 from .record_files import as_settings, files_of
-from .runs import FORMAT, online_record, optimum_or_failure, optimum_provenance, trajectory_of
+from .runs import online_record, optimum_or_failure, optimum_provenance, trajectory_of
 
 OPTIMAL, GUESSED = "optimal from ", ", started from "
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,71 +14,18 @@ import xarray as xr
 
 from ...offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
 from ...online import (
-    load,
-    save,
     to_dataset,
 )
 from ...online.loop import Progress
 from ...online.records import listed, versions
-from ...symbolic import InputError, RunError, Setup, StationKeeping
+from ...symbolic import RunError, Setup, StationKeeping
 from ...symbolic.arrays import Array
-from ...symbolic.game import problem_to_data
 from ..policies import AnyPolicy, contender
 from ..scenario import Scenario
+from .provenance import OFFLINE_KEY, provenance
 from .record_files import with_files
 from .running import closed_loop
-
-FORMAT = 8  # of the records; raise it when what is in them, or how a run is made, changes
-OFFLINE_KEY = {"vehicle", "problem", "current", "game", "envelope", "offline"}
-
-
-def provenance(
-    scenario: Scenario, kind: str, include: set[str] | Mapping[str, Any] | None = None
-) -> dict[str, Any]:
-    """Return the attributes that say where a record comes from.
-
-    `key` is the hash of what the numbers depend on: the settings (those named in `include`, or all),
-    the vehicle's parameters, the compiled functions and the versions.
-    """
-    setup = scenario.setup()
-    plant_data = model_text(setup)
-    text = scenario.model_dump_json(include=include)
-    learned = include is None or "basis" in include
-    functions = setup.fingerprint if learned else setup.plant_fingerprint
-    parts = [str(FORMAT), kind, text, plant_data, functions]
-    parts.append(repr(sorted(versions().items())))
-    start = scenario.initial_weights() if include is None else None
-    parts.append("" if start is None else start.tobytes().hex())
-    simulated = include is None or "simulation" in include
-    driven = scenario.plant_vehicle() if simulated else None
-    plant = "" if driven is None else driven.model_dump_json()
-    parts.append(plant)
-    key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
-    return {
-        "kind": kind,
-        "scenario": scenario.model_dump_json(),
-        "vehicle" if scenario.problem is None else "problem": plant_data,
-        "plant": plant,
-        "mode": scenario.simulation.mode,
-        "seed": scenario.samples.seed,
-        "functions": functions,
-        "format": FORMAT,
-        "machine": machine(),
-        "key": key,
-    }
-
-
-def model_text(setup: Setup) -> str:
-    """Return what policies are made for, as JSON: a vehicle's parameters, or a problem's equations."""
-    if isinstance(setup, StationKeeping):
-        return setup.model.vehicle.model_dump_json()
-    return json.dumps(problem_to_data(setup.problem))
-
-
-def machine() -> str:
-    """Return the kind of machine and the widest vector instructions that numpy found on it."""
-    found = np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", [])
-    return " ".join([platform.system(), platform.machine(), *found[-1:]])
+from .store import reused
 
 
 def online_record(
@@ -282,20 +227,3 @@ def _extremal(solution: OfflineSolution, other: DirectSolution) -> dict[str, Any
         "second_order": other.second_order,
         "costate": other.costate.tolist(),
     }
-
-
-def reused(path: Path | None, key: str, make: Callable[[], xr.Dataset]) -> xr.Dataset:
-    """Return the record at `path` if it is whole and of this key, or make it and keep it there."""
-    if path is not None and path.is_file():
-        try:
-            kept = load(path)
-            # an interrupted run is made again; one that ended by itself would end so again
-            whole = not str(kept.attrs.get("stopped", "")).startswith("interrupted")
-            if kept.attrs.get("key") == key and whole:
-                return kept
-        except InputError:
-            pass  # a record that can't be read is made again
-    dataset = make()
-    if path is not None:
-        save(dataset, path)
-    return dataset

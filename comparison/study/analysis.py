@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...offline import Pairs, Plant, error_sizes, fit_weights
+from ...offline import Pairs, Plant, QuickValue, error_sizes, fit_weights
 from ...offline.ideal_weights import least_states
 from ...online.paper import BellmanTerms, bellman_error
 from ...symbolic import InputError, Problem, RunError, Setup
 from ...symbolic.arrays import Array
 from ...symbolic.errors import nearest
-from ..merit import GameValue
 from ..optima import TRAINING, Bounds, Ideal, envelope_states, unit_text
 from ..records import provenance, reused
 from ..scenario import Scenario
@@ -83,7 +82,7 @@ def _analysis(
     scenario: Scenario, learned: xr.Dataset, field: Field | None, attributes: dict[str, Any]
 ) -> xr.Dataset:
     setup = scenario.setup()
-    value = GameValue(setup)
+    value = QuickValue(setup.problem)
     parts = [_along(setup, learned, value)]
     if field is not None:
         parts.append(_around(setup, learned, field))
@@ -94,7 +93,7 @@ def _analysis(
 
 
 def optimal_pairs(
-    setup: Setup, value: GameValue, n_states: int, seed: int, stream: int = TRAINING
+    setup: Setup, value: QuickValue, n_states: int, seed: int, stream: int = TRAINING
 ) -> Pairs:
     """Return V* and its gradient at seeded states of the envelope, those where an optimum is found."""
     found = []
@@ -147,7 +146,7 @@ def weights_in_use(learned: xr.Dataset, name: str, times: Array) -> Array:
     return np.asarray(weights[np.minimum(after, len(weights) - 1)])
 
 
-def _along(setup: Setup, learned: xr.Dataset, value: GameValue) -> xr.Dataset:
+def _along(setup: Setup, learned: xr.Dataset, value: QuickValue) -> xr.Dataset:
     """Return the errors at moments of the learned run."""
     problem, game, plant = setup.problem, setup.game, Plant(setup.problem)
     zeta, time = learned["zeta"].values, learned["time"].values

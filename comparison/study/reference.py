@@ -13,8 +13,9 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from ...offline import QuickValue
 from ...symbolic import Setup
-from ..merit import GameValue, Regret, RunMetrics, dissipation_margin
+from ..merit import Regret, RunMetrics, dissipation_margin
 from ..policies import CONTENDERS
 from ..records import KIND as CLAIRVOYANT
 from ..scenario import Scenario
@@ -186,7 +187,7 @@ class ClairvoyantOptimum(Reference):
 
     def margins(self, setup: Setup, records: Mapping[str, xr.Dataset]) -> dict[str, float]:
         """Return the dissipation margin of the runs that did not end at once."""
-        value = GameValue(setup)
+        value = QuickValue(setup.problem)
         ends = {name: record["zeta"].values[[0, -1]] for name, record in records.items()}
         return {
             name: dissipation_margin(records[name], value(first), value(last))

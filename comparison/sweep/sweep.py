@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...online import load
-from ...online.records import read_parts, remove_temporaries, versions, written_whole
+from ...online.records import remove_temporaries, versions, written_whole
 from ...symbolic import InputError
 from ..parallel import Event, Work
+from ..records import kept_key
 from .sweep_plan import Plan, Run
 from .sweep_run import FIGURES, Bench, Finished, lost_row, worker
 from .sweep_table import Journal, write_csv, write_netcdf
@@ -165,12 +166,10 @@ class Sweep:
     def _adopt(self, run: Run) -> None:
         """Make the line of a record that is whole and has none."""
         path = self._path(run.key)
-        if path.is_file():
-            with suppress(InputError, ValueError):
-                attributes, _ = read_parts(path)
-                if attributes.get("sweep_key") == run.key:
-                    load(path)  # to its end
-                    self._keep(run, json.loads(attributes["row"]), path.read_bytes())
+        if kept_key(path, "sweep_key") == run.key:
+            with suppress(InputError, ValueError, KeyError):
+                row = json.loads(load(path).attrs["row"])  # read to its end
+                self._keep(run, row, path.read_bytes())
 
     def _checksum(self, key: str) -> list[int] | None:
         try:

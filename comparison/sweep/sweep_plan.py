@@ -6,7 +6,6 @@ settings in the order in which they were given. A run's key says what its number
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Callable
@@ -23,7 +22,7 @@ from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ...symbolic.pyfile import file_content, is_named
 from ..policies import contender
-from ..records import FORMAT, model_text
+from ..records import FORMAT, key_of, model_text
 from ..scenario import Scenario
 from .vary import Choices, Range, varied
 
@@ -187,7 +186,7 @@ class Plan:
         parts = [self._sources(json.dumps(named)), policy, json.dumps([settings, zeta], sort_keys=True)]
         if is_named(policy):
             parts.append(file_content(policy))
-        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:24]
+        return key_of(*parts)[:24]
 
     @cached_property
     def _sources(self) -> Callable[[str], str]:
@@ -201,6 +200,6 @@ class Plan:
             model = one.model_vehicle().model_dump_json() if vehicle else model_text(one.setup())
             parts += [self.scenario.model_dump_json(), model]
             parts += ["" if driven is None else driven.model_dump_json(), *one.file_contents()]
-            return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+            return key_of(*parts)
 
         return sources

@@ -12,9 +12,10 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
+from ...offline import QuickValue
 from ...symbolic import RunError, Setup, StationkeepError
 from ...symbolic.arrays import Array
-from ..merit import GameValue, dissipation_margin, run_metrics
+from ..merit import dissipation_margin, run_metrics
 from ..parallel import Work
 from ..records import contender_record
 from ..scenario import Scenario
@@ -106,14 +107,14 @@ class _Setups:
     """The last setups that were built, each with what finds V* there and remembers the last one."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[str, tuple[Setup, GameValue]] = OrderedDict()
+        self._known: OrderedDict[str, tuple[Setup, QuickValue]] = OrderedDict()
 
-    def of(self, scenario: Scenario) -> tuple[Setup, GameValue]:
+    def of(self, scenario: Scenario) -> tuple[Setup, QuickValue]:
         """Return the scenario's setup, built once, and give it to the scenario."""
         text = scenario.setup_text()
         if text not in self._known:
             setup = scenario.setup()
-            self._known[text] = setup, GameValue(setup)
+            self._known[text] = setup, QuickValue(setup.problem)
             if len(self._known) > N_SETUPS:
                 self._known.popitem(last=False)
         self._known.move_to_end(text)
@@ -143,7 +144,7 @@ def _finished(bench: Bench, setups: _Setups, run: Run) -> Finished:
     return Finished(run, row, bytes(small.to_netcdf(engine="h5netcdf")))
 
 
-def _figures(record: xr.Dataset, setup: Setup, value: GameValue) -> dict[str, Any]:
+def _figures(record: xr.Dataset, setup: Setup, value: QuickValue) -> dict[str, Any]:
     zeta, fallback = record["zeta"].values, record["fallback"].values
     time_axis = record["time"].values
     row: dict[str, Any] = {"reason": str(record.attrs["stopped"])}
