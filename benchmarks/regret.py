@@ -12,7 +12,7 @@ as printed. Every ratio is to the linear policy on the same states.
 The second form tells what becomes of wrong starts: half of P, the P of a vehicle with half the added
 mass, and zero.
 
-Finished runs are kept in DIR, each under the hash of all that it depends on: what was killed goes on
+FinishedRun runs are kept in DIR, each under the hash of all that it depends on: what was killed goes on
 where it was.
 """
 

@@ -4,7 +4,7 @@ from .adapters import export
 from .compare import Study, compare
 from .records import Replay, replay
 from .scenario import Scenario, generate
-from .sweep import Swept, sweep
+from .sweep import SweepResult, sweep
 from .theory import Condition, check
 
 __all__ = [
@@ -12,7 +12,7 @@ __all__ = [
     "Replay",
     "Scenario",
     "Study",
-    "Swept",
+    "SweepResult",
     "check",
     "compare",
     "export",

@@ -1,5 +1,6 @@
 """Online learning: Bellman error, critic and actor laws, the controller and the closed loop."""
 
+from .laws import Critic
 from .learning import (
     AS_PRINTED,
     Learner,
@@ -33,6 +34,7 @@ __all__ = [
     "Allocation",
     "Allocator",
     "Controller",
+    "Critic",
     "DisturbanceObserver",
     "DisturbanceSettings",
     "Feedback",

@@ -15,8 +15,8 @@ from .textbook import two_state_game
 from .underwater import Model, StationKeeping, Thrusters, Vehicle, require_pitch, require_vehicle_state
 from .value import (
     Basis,
-    Path,
     PointTerms,
+    PredictedPath,
     Prediction,
     Setup,
     ValueFunctions,
@@ -37,8 +37,8 @@ __all__ = [
     "InverseDynamics",
     "Kernel",
     "Model",
-    "Path",
     "PointTerms",
+    "PredictedPath",
     "Prediction",
     "Problem",
     "RunError",

@@ -31,7 +31,7 @@ def altered(record: Path, folder: Path, factor: float) -> Path:
 
 
 def test_a_fresh_record_is_bit_equal(tmp_path: Path) -> None:
-    """Made and replayed as a user does; within another process BLAS may have more threads."""
+    """ComparedRuns and replayed as a user does; within another process BLAS may have more threads."""
     settings = sets(*QUICK, "simulation.duration=0.5")
     assert run("online", "--quiet", "--out", ".", *settings, cwd=tmp_path).code == 0
     answer = run("replay", "learned.nc", "--json", "--quiet", cwd=tmp_path)

@@ -36,7 +36,7 @@ import numpy as np
 import xarray as xr
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.parallel import Event
-from stationkeep.comparison.sweep import Bench, Finished, Plan, Run, Setup, Sweep
+from stationkeep.comparison.sweep import FinishedRun, Plan, Run, Setup, Sweep, WorkerSettings
 from stationkeep.comparison.sweep.sweep_run import FIGURES, TIMES, lost_row
 
 COMMAND = [sys.executable, "-m", "stationkeep.cli.main", "sweep", "--quiet", "--json"]
@@ -121,7 +121,7 @@ def table(folder: Path) -> None:
     scenario = Scenario.load()
     peaks = []
     for n in (10_000, 30_000):
-        bench = Bench(scenario)
+        bench = WorkerSettings(scenario)
         plan = Plan(scenario, ("learned", "linear"), states=n // 2)
         (folder / str(n)).mkdir()
         tracemalloc.start()
@@ -149,13 +149,15 @@ def table(folder: Path) -> None:
     )
 
 
-def made_up(setup: Setup, bench: Bench, runs: Sequence[Run]) -> Generator[Event[Finished], None, None]:
+def made_up(
+    setup: Setup, bench: WorkerSettings, runs: Sequence[Run]
+) -> Generator[Event[FinishedRun], None, None]:
     """Yield rows of random numbers for all runs."""
     rng = np.random.default_rng(1)
     for i, run in enumerate(runs):
         figures = dict(zip(FIGURES, rng.random(len(FIGURES)).tolist(), strict=True))
         row = lost_row(run, bench.scenario, "") | figures | {"failed": False}
-        yield Event(i, Finished(run, row, None))
+        yield Event(i, FinishedRun(run, row, None))
 
 
 def killed(folder: Path, options: argparse.Namespace) -> None:

@@ -17,7 +17,7 @@ from ...online import LearnerSettings, SimulationSettings
 from ...symbolic import Problem
 
 DECAY = 0.117  # 1/s, of the slowest mode of the shipped game
-HELD = 0.15  # a control period times the fastest mode: 20 ms on the shipped vehicle
+HELD = 0.03  # a control period times the fastest mode, so that the hold costs about 1e-4 of the optimum
 STABLE = 2.0  # the longest step of a prediction times the fastest mode; Runge-Kutta ends at 2.8
 
 

@@ -25,7 +25,7 @@ ALONE = ("quadratic", "gradient")  # variants of the learned policy: from the sc
 
 
 @dataclass(frozen=True)
-class Made:
+class ComparedRuns:
     """What was made, in the order of the states.
 
     Attributes
@@ -56,7 +56,7 @@ class _Task:
     what: str
 
 
-def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell) -> Made:
+def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell) -> ComparedRuns:
     """Make all records, or reuse those in `folder`.
 
     Raises
@@ -89,7 +89,7 @@ def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
     for runs in metrics.values():
         pairs = zip(runs, found[reference.kind], strict=False)
         runs[:] = [_regretted(run, optimum.value, reference) for run, optimum in pairs]
-    return Made(metrics, found)
+    return ComparedRuns(metrics, found)
 
 
 def record_path(folder: Path, state: int, what: str) -> Path:

@@ -16,7 +16,7 @@ from ..parallel import Event, default_workers, locked, run_on_cluster, run_tasks
 from ..scenario import Scenario
 from .sweep import Execute, Setup, Sweep
 from .sweep_plan import Plan, Run, Sampling
-from .sweep_run import Bench, Finished
+from .sweep_run import FinishedRun, WorkerSettings
 from .sweep_summary import summary
 from .vary import parse_vary
 
@@ -24,7 +24,7 @@ Stage = Callable[[str, int, int, int], None]
 
 
 @dataclass(frozen=True)
-class Swept:
+class SweepResult:
     """What a sweep found.
 
     Attributes
@@ -60,7 +60,7 @@ def sweep(
     records: Literal["all", "failed", "none"] = "all",
     every: float = 0.2,
     progress: Stage | None = None,
-) -> Swept:
+) -> SweepResult:
     """Make the closed-loop runs that are missing in a folder; write journal, records and tables.
 
     Runs are the product of the varied settings, sampled points, initial states and policies. One that
@@ -93,7 +93,7 @@ def sweep(
     started = time.monotonic()
     one = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
     told = progress if progress is not None else _silent
-    bench = Bench(one, records, every)
+    bench = WorkerSettings(one, records, every)
     asked = [f"envelope.scale={','.join(map(str, scales))}"] if len(scales) else []
     plan = Plan(
         scenario=one,
@@ -111,7 +111,7 @@ def sweep(
         resumed = _all_runs(going, execute, told)
         csv, table = going.write_tables()
         groups = summary(going.rows(), [choice.key for choice in plan.choices])
-    return Swept(
+    return SweepResult(
         runs=len(plan),
         failed=sum(group["failed"] for group in groups),
         resumed=resumed,
@@ -148,7 +148,9 @@ def _executor(workers: int | None, cluster: str | None) -> Execute:
         return partial(run_on_cluster, cluster)
     number = default_workers() if workers is None else workers
 
-    def here(setup: Setup, bench: Bench, runs: Sequence[Run]) -> Generator[Event[Finished], None, None]:
+    def here(
+        setup: Setup, bench: WorkerSettings, runs: Sequence[Run]
+    ) -> Generator[Event[FinishedRun], None, None]:
         return run_tasks(setup, bench, runs, number)
 
     return here

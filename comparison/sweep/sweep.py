@@ -24,11 +24,11 @@ from ...symbolic import InputError
 from ..parallel import Event, Work
 from ..records import kept_key
 from .sweep_plan import Plan, Run
-from .sweep_run import FIGURES, Bench, Finished, lost_row, worker
+from .sweep_run import FIGURES, FinishedRun, WorkerSettings, lost_row, worker
 from .sweep_table import Journal, write_csv, write_netcdf
 
-Setup = Callable[[Bench], Work[Run, Finished]]
-Execute = Callable[[Setup, Bench, Sequence[Run]], Generator[Event[Finished], None, None]]
+Setup = Callable[[WorkerSettings], Work[Run, FinishedRun]]
+Execute = Callable[[Setup, WorkerSettings, Sequence[Run]], Generator[Event[FinishedRun], None, None]]
 Progress = Callable[[int, int], None]
 JOURNAL, RECORDS = "sweep.journal", "runs"
 
@@ -47,7 +47,7 @@ class Sweep:
     """
 
     plan: Plan
-    bench: Bench
+    bench: WorkerSettings
     folder: Path
     journal: Journal = field(init=False)
     places: NDArray[np.int64] = field(init=False)

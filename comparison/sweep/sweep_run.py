@@ -48,7 +48,7 @@ TIMES = ("policy_microseconds", "policy_mean", "seconds")
 
 
 @dataclass(frozen=True)
-class Bench:
+class WorkerSettings:
     """What every worker is told.
 
     Attributes
@@ -67,7 +67,7 @@ class Bench:
 
 
 @dataclass(frozen=True)
-class Finished:
+class FinishedRun:
     """A run that is over.
 
     Attributes
@@ -81,11 +81,11 @@ class Finished:
     record: bytes | None
 
 
-def worker(bench: Bench) -> Work[Run, Finished]:
+def worker(bench: WorkerSettings) -> Work[Run, FinishedRun]:
     """Return what makes a run, for `pool.run_tasks`."""
     setups = _Setups()
 
-    def work(run: Run) -> Iterator[Finished]:
+    def work(run: Run) -> Iterator[FinishedRun]:
         with np.errstate(all="ignore"):  # a run that diverges says so in its row
             finished = _finished(bench, setups, run)
         yield finished
@@ -123,7 +123,7 @@ class _Setups:
         return setup, value
 
 
-def _finished(bench: Bench, setups: _Setups, run: Run) -> Finished:
+def _finished(bench: WorkerSettings, setups: _Setups, run: Run) -> FinishedRun:
     started = time.perf_counter()
     row, record = lost_row(run, bench.scenario, ""), None
     try:
@@ -138,10 +138,10 @@ def _finished(bench: Bench, setups: _Setups, run: Run) -> Finished:
     row["seconds"] = time.perf_counter() - started
     kept = bench.records == "all" or (bench.records == "failed" and row["failed"])
     if record is None or not kept:
-        return Finished(run, row, None)
+        return FinishedRun(run, row, None)
     small = thinned(record, bench.every)
     small.attrs |= {"sweep_key": run.key, "row": json.dumps(row)}
-    return Finished(run, row, bytes(small.to_netcdf(engine="h5netcdf")))
+    return FinishedRun(run, row, bytes(small.to_netcdf(engine="h5netcdf")))
 
 
 def _figures(record: xr.Dataset, setup: Setup, value: QuickValue) -> dict[str, Any]:

@@ -73,27 +73,24 @@ class Learner:
         return self.problem.game
 
     def step(self, zeta: Array, dt: float) -> LearnerStep:
-        """Learn for dt [s] from the state ζ (n,) and the samples: the algorithm.
-
-        Certify the actors, go where rows are wanted and sum them, move the critic (19), let the actors
-        follow it (20)(21) and accept of their step what is certified.
-        """
+        """Learn for dt [s] from the state ζ (n,) and the samples: the algorithm."""
+        # certify: the actors of before, or the reference's
         start = self.guard.certified(zeta, (self.actor_1, self.actor_2))
         weights = (self.critic, *start.actors)
-
+        # rows of (17)
         self.source.move(zeta, weights)
         seen = self.source.at(zeta, weights)
-
+        # critic (19)
         self.critic = self.law.step(self.critic, seen.equations, dt)
-
+        # actors (20)(21)
         gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
         proposed = (
             actor_step(start.actors[0], self.critic, gains[0], dt, self.projection),
             actor_step(start.actors[1], self.critic, gains[1], dt, self.projection),
         )
+        # accept what is certified of their way
         end = self.guard.accepted(zeta, start, proposed)
         (self.actor_1, self.actor_2), self.linear = end.actors, end.linear
-
         self.memory.step()
         return self._recorded(weights, seen, start, end)
 

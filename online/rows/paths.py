@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...symbolic import Path, Prediction
+from ...symbolic import PredictedPath, Prediction
 from ...symbolic.arrays import Array
 
 VALUE_SHARE = 1e-2  # of a relative square error of the value, beside one of relative regret
@@ -70,7 +70,7 @@ class PathRows:
         """Return no rows, as `at` does."""
         return np.zeros((0, self._prediction.basis.n_basis)), np.zeros(0), np.zeros(0)
 
-    def _stacked(self, paths: list[Path]) -> tuple[Array, Array, Array]:
+    def _stacked(self, paths: list[PredictedPath]) -> tuple[Array, Array, Array]:
         points = np.vstack([path.states[self._nodes] for path in paths])
         costates = np.vstack([path.costates[self._nodes] for path in paths])  # type: ignore[index]
         regressors, targets, sigma = self._prediction.rows(points, costates)

@@ -2,15 +2,15 @@
 
 from .basis import Basis, BasisFunction, drag, drag_cubic, find_function, quadratic
 from .functions import PointTerms, ValueFunctions
-from .prediction import BOUND, Path, Prediction, growing_steps
+from .prediction import BOUND, PredictedPath, Prediction, growing_steps
 from .setup import Setup
 
 __all__ = [
     "BOUND",
     "Basis",
     "BasisFunction",
-    "Path",
     "PointTerms",
+    "PredictedPath",
     "Prediction",
     "Setup",
     "ValueFunctions",

@@ -32,7 +32,7 @@ Exporter = Callable[[casadi.Function, int], Kernel]
 
 
 @dataclass(frozen=True)
-class Path:
+class PredictedPath:
     """A predicted trajectory at the ends of its steps.
 
     Attributes
@@ -83,17 +83,17 @@ class Prediction:
         self._exporter = exporter
         self._row_kernels: dict[int, Kernel] = {}
 
-    def path(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> Path:
+    def path(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> PredictedPath:
         """Return the path from ζ (n,) under Ŵ_a1, Ŵ_a2 (m,) over `steps` (N,) [s]."""
         (nodes,) = self._path_kernel(zeta, actor_1, actor_2, steps)
         return self._as_path(nodes, steps)
 
-    def linear_path(self, zeta: Array, steps: Array) -> Path:
+    def linear_path(self, zeta: Array, steps: Array) -> PredictedPath:
         """Return the path from ζ (n,) under the linear policies u_1 = -K_1 ζ and u_2 = K_2 ζ."""
         (nodes,) = self._linear_kernel(zeta, steps)
         return self._as_path(nodes, steps)
 
-    def costates(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> Path:
+    def costates(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> PredictedPath:
         """Return the same path with its costates."""
         nodes, costates = self._costate_kernel(zeta, actor_1, actor_2, steps)
         return self._as_path(nodes, steps, costates.T)
@@ -115,13 +115,13 @@ class Prediction:
         by_point = regressors.reshape(n_points, m, k).transpose(0, 2, 1)
         return by_point, targets.reshape(n_points, k), sigma.reshape(n_points, m)
 
-    def _as_path(self, nodes: Array, steps: Array, costates: Array | None = None) -> Path:
+    def _as_path(self, nodes: Array, steps: Array, costates: Array | None = None) -> PredictedPath:
         n = self.problem.n_states
         states, cost, clock = nodes[:n].T, nodes[n], nodes[n + 1]
         stayed = clock[-1] >= (1.0 - 1e-6) * steps.sum()
         rest = float(states[-1] @ self.problem.P @ states[-1])
         to_go = cost[-1] + rest - cost if stayed else np.full(len(cost), np.inf)
-        return Path(np.append(0.0, np.cumsum(steps)), states, to_go, costates)
+        return PredictedPath(np.append(0.0, np.cumsum(steps)), states, to_go, costates)
 
     @cached_property
     def _step(self) -> casadi.Function:
