@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import xarray as xr
 
@@ -143,4 +145,7 @@ def conditions(comparison: Comparison) -> Table:
 
 
 def _number(value: float | None, form: str, factor: float = 1.0) -> str:
-    return "–" if value is None else f"{factor * value:{form}}"
+    """Return a number in words: a dash where it is not known, ∞ for what failed."""
+    if value is None:
+        return "–"
+    return f"{factor * value:{form}}" if math.isfinite(value) else "∞"
