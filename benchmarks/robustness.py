@@ -6,7 +6,7 @@
 Each table says what its runs are. A run is lost when it ends early: at the pitch limit, beyond chi, or
 where the controller or the plant fails; it is counted with its reason, and its other figures are those
 up to that moment. Rows are kept in FILE as runs end; what is killed goes on from there. Everything
-random is seeded. docs/robustness.md says what the tables mean.
+random is seeded. docs/theory/disturbances.md says what the tables mean.
 """
 
 from __future__ import annotations

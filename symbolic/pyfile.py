@@ -48,7 +48,8 @@ def find_callable(text: str, what: str) -> Callable[..., Any]:
     """Return the function that 'path/to/file.py:name' names; raises as `find_attribute`."""
     found = find_attribute(text, what)
     if not callable(found):
-        raise InputError(f"'{text}' is no function; give {what} as file.py:function")
+        file, _, attribute = text.rpartition(":")
+        raise InputError(f"'{file}' has no function '{attribute}'; give {what} as file.py:function")
     return found  # type: ignore[no-any-return]
 
 

@@ -42,6 +42,6 @@ def test_every_script_is_in_one_of_the_folders_and_in_the_index() -> None:
 
 
 def test_scripts_that_documents_name_exist() -> None:
-    for page in (ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").glob("*.md")):
+    for page in (ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")):
         for name in re.findall(r"benchmarks/[\w/]+\.py", page.read_text(encoding="utf-8")):
             assert (ROOT / name).is_file(), f"{page.name}: {name}"

@@ -37,6 +37,13 @@ def test_one_at_a_time(tmp_path: Path, one_sentence: Check) -> None:
         pass
 
 
+def test_the_folder_is_made(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "one"
+    with locked(folder):
+        assert (folder / NAME).is_file()
+    assert folder.is_dir()
+
+
 def test_it_is_given_back_after_an_error(tmp_path: Path) -> None:
     with pytest.raises(ZeroDivisionError), locked(tmp_path):
         raise ZeroDivisionError

@@ -1,58 +1,46 @@
-"""The code blocks of docs/*.md run in the order of a page, in one folder and one namespace.
+"""The code blocks of the README and docs/ run in the order of a page, in one folder and one namespace.
 
 Python blocks run as they are. A TOML block whose first line is `# NAME.toml` is that file, and so is a
 Python block after `<!-- file: NAME -->`. A shell block is parsed as command lines, and run after
 `<!-- run -->`. A page with a block after `<!-- slow -->` runs once without these blocks, and once with
-them as slow evidence.
+them as slow evidence. What stands in backticks exists: commands and their options, names of the
+package, settings, files.
 """
 
 from __future__ import annotations
 
 import re
-import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from stationkeep.cli.main import COMMANDS, parser
 
-ROOT = Path(__file__).resolve().parents[1]
-BLOCK = re.compile(r"(?:<!-- (.*?) -->\n)?^```(python|toml|sh)\n(.*?)^```", re.DOTALL | re.MULTILINE)
-PAGES = sorted((ROOT / "docs").glob("*.md"))
+from .pages import (
+    PAGES,
+    README,
+    ROOT,
+    anchors,
+    blocks,
+    broken,
+    commands,
+    exists,
+    inline,
+    links,
+    mentioned,
+    name_of,
+    program,
+    read,
+    unknown,
+)
+from .test_wings import WINGS
 
-
-def blocks(page: Path) -> list[tuple[str, str, str]]:
-    """Return mark, language and text of each block."""
-    return BLOCK.findall(page.read_text(encoding="utf-8"))
-
-
-def commands(text: str) -> Iterator[list[str]]:
-    for line in text.splitlines():
-        words = shlex.split(line, comments=True)
-        if words[:1] == ["stationkeep"]:
-            yield words[1:]
-
-
-def program(page: Path, *, slow: bool) -> str:
-    """Return the page as one program; without what is slow unless it is asked for."""
-    lines = ["import subprocess, sys", "from pathlib import Path"]
-    for mark, language, text in blocks(page):
-        if mark == "slow" and not slow:
-            continue
-        name = re.match(r"# (\S+\.toml)\n", text)
-        if language == "toml" and name:
-            lines.append(f"Path({name[1]!r}).write_text({text!r})")
-        elif mark.startswith("file: "):
-            lines.append(f"Path({mark.removeprefix('file: ')!r}).write_text({text!r})")
-        elif language == "python":
-            lines.append(text)
-        elif language == "sh" and mark in ("run", "slow"):
-            for words in commands(text):
-                call = ["-m", "stationkeep.cli.main", *words]
-                lines.append(f"subprocess.run([sys.executable, *{call!r}], check=True)")
-    return "\n".join(lines)
+EVERY = [README, *PAGES, ROOT / "benchmarks" / "README.md"]
+FOLDERS = "symbolic|online|offline|comparison|cli"
+GROUPS = "game|envelope|basis|learner|samples|simulation"
+FILES = re.compile(rf"(?:{FOLDERS}|api|benchmarks|tests|docs|\.ci)/[\w./-]*")
+NAMES = re.compile(rf"(?:stationkeep|{FOLDERS}|{GROUPS})(?:\.[A-Za-z_]\w*(?:\[i\])?)+")
 
 
 def runs(text: str, folder: Path, seconds: float) -> None:
@@ -64,22 +52,112 @@ def runs(text: str, folder: Path, seconds: float) -> None:
 
 
 def is_slow(page: Path) -> bool:
-    return any(mark == "slow" for mark, _, _ in blocks(page))
+    return any(block.mark == "slow" for block in read(page))
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p)], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [p for p in [README, *PAGES] if read(p)], ids=name_of)
 def test_blocks_run(page: Path, tmp_path: Path) -> None:
-    runs(program(page, slow=False), tmp_path, 120)
+    runs(program(read(page), slow=False), tmp_path, 240)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [p for p in PAGES if is_slow(p)], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [p for p in [README, *PAGES] if is_slow(p)], ids=name_of)
 def test_slow_blocks_run(page: Path, tmp_path: Path) -> None:
-    runs(program(page, slow=True), tmp_path, 900)
+    runs(program(read(page), slow=True), tmp_path, 900)
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p)], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [p for p in [README, *PAGES] if read(p)], ids=name_of)
 def test_commands_are_commands(page: Path) -> None:
-    for _, language, text in blocks(page):
-        for words in commands(text) if language == "sh" else ():
+    for block in read(page):
+        for words in commands(block.text) if block.language == "sh" else ():
             assert parser().parse_args(words).command in COMMANDS
+
+
+@pytest.mark.parametrize("page", EVERY, ids=name_of)
+def test_commands_in_a_sentence_exist_with_their_options(page: Path) -> None:
+    for span in inline(page.read_text(encoding="utf-8")):
+        words = mentioned(span)
+        assert words is None or unknown(words) == [], span
+
+
+@pytest.mark.parametrize("page", [README, *PAGES], ids=name_of)
+def test_names_settings_and_files_in_a_sentence_exist(page: Path) -> None:
+    for span in inline(page.read_text(encoding="utf-8")):
+        words = span.split()
+        if FILES.fullmatch(words[-1]):
+            assert (ROOT / words[-1]).exists(), span
+        elif NAMES.fullmatch(span):
+            assert exists(span), span
+
+
+@pytest.mark.parametrize("page", [*EVERY, ROOT / "CHANGELOG.md"], ids=name_of)
+def test_links_lead_somewhere(page: Path) -> None:
+    assert broken(page) == []
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = ROOT / "docs" / "README.md"
+    listed = {(index.parent / target).resolve() for target in links(index.read_text(encoding="utf-8"))}
+    assert {page for page in PAGES if page != index} <= listed
+
+
+def test_pages_that_sources_name_exist() -> None:
+    sources = [path for folder in FOLDERS.split("|") for path in (ROOT / folder).rglob("*.py")]
+    for path in [*sources, *(ROOT / "benchmarks").rglob("*.py")]:
+        for name in re.findall(r"docs/[\w/-]+\.md", path.read_text(encoding="utf-8")):
+            assert (ROOT / name).is_file(), f"{name_of(path)}: {name}"
+
+
+@pytest.mark.parametrize(
+    ("span", "missing"),
+    [
+        ("stationkeep animate RECORD", ["animate"]),
+        ("stationkeep compare --n-states 3", []),
+        ("stationkeep compare --film", ["--film"]),
+        ("compare --animation", []),
+        ("sweep --gammas 2", ["--gammas"]),
+        ("stationkeep offline|check --json", []),
+        ("stationkeep --version", []),
+    ],
+)
+def test_what_does_not_exist_is_found(span: str, missing: list[str]) -> None:
+    words = mentioned(span)
+    assert words is not None
+    assert unknown(words) == missing
+
+
+@pytest.mark.parametrize("span", ["compare", "--set", "ruff check --fix", "online"])
+def test_what_is_no_command_line_is_left_alone(span: str) -> None:
+    assert mentioned(span) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "there"),
+    [
+        ("online.paper.critic_rate", True),
+        ("online.paper.no_such", False),
+        ("stationkeep.compare", True),
+        ("simulation.chi", True),
+        ("simulation.disturbance.kind", True),
+        ("simulation.no_such", False),
+        ("offline.value_tolerance", True),
+        ("learner", True),
+    ],
+)
+def test_names_are_looked_up(name: str, there: bool) -> None:
+    assert exists(name) is there
+
+
+def test_a_page_is_taken_apart() -> None:
+    text = "# One, two: *3*\n`a\nb` and [c](d.md#e)\n<!-- run -->\n```sh\n`x` [y](z)\n```\n"
+    assert inline(text) == ["a b"]
+    assert links(text) == ["d.md#e"]
+    assert anchors(text) == {"one-two-3"}
+    assert blocks(text) == [("run", "sh", "`x` [y](z)\n")]
+
+
+@pytest.mark.parametrize("folder", WINGS)
+def test_the_architecture_page_has_every_wing(folder: str) -> None:
+    named = inline((ROOT / "docs" / "architecture.md").read_text(encoding="utf-8"))
+    for wing in WINGS[folder]:
+        assert f"{folder}/{wing}/" in named or f"{folder}/{wing}.py" in named

@@ -15,7 +15,7 @@ NAME = ".stationkeep-lock"
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Hold the lock of a folder, a file with this process's number in it.
+    """Hold the lock of a folder, which is made; a file with this process's number in it.
 
     A file that a dead process left is taken over: what counts is the system's lock on it.
 
@@ -40,6 +40,7 @@ def locked(folder: Path) -> Iterator[None]:
 def _locked_file(folder: Path, path: Path) -> int:
     while True:
         try:
+            folder.mkdir(parents=True, exist_ok=True)
             handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
             raise InputError(f"'{path}' can't be written ({error.strerror})") from None

@@ -67,9 +67,10 @@ class Scenario(Settings):
 
     @model_validator(mode="after")
     def _one_plant(self) -> Scenario:
-        if (self.vehicle is None) == (self.problem is None):
-            given = "both" if self.vehicle is not None else "neither"
-            raise ValueError(f"{given} 'vehicle' and 'problem' are given; give one of the two")
+        if self.vehicle is None and self.problem is None:
+            raise ValueError("the key 'vehicle' is required and missing; add it, or a 'problem'")
+        if self.vehicle is not None and self.problem is not None:
+            raise ValueError("both 'vehicle' and 'problem' are given; give one of the two")
         require_keys(self, self.problem)
         return self
 

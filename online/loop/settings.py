@@ -22,7 +22,7 @@ class RunSettings(Settings):
     tolerance : relative tolerance of the plant's integration
     chi : the run ends, the plant lost, when a state exceeds this multiple of the full envelope's
         half-width; the default is where predictions end too, and a quarter more than the optimum needs
-        from the envelope's corners (docs/robustness.md)
+        from the envelope's corners (docs/theory/disturbances.md)
     monitor_period : least time between two looks of the monitor [s]
     seed : of the envelope states that `compare` adds
     """
