@@ -40,6 +40,7 @@ def locked(folder: Path) -> Iterator[None]:
 def _locked_file(folder: Path, path: Path) -> int:
     while True:
         try:
+            folder.mkdir(parents=True, exist_ok=True)
             handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
         except OSError as error:
             raise InputError(f"'{path}' can't be written ({error.strerror})") from None

@@ -15,16 +15,13 @@ import numpy as np
 import xarray as xr
 
 from ...offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
-from ...online import (
-    load,
-    save,
-    to_dataset,
-)
+from ...online import load, save, to_dataset
 from ...online.loop import Progress
 from ...online.records import listed, versions
 from ...symbolic import InputError, RunError, Setup, StationKeeping
 from ...symbolic.arrays import Array
 from ...symbolic.game import problem_to_data
+from ...symbolic.pyfile import file_content, is_named
 from ..policies import AnyPolicy, contender
 from ..scenario import Scenario
 from .record_files import with_files
@@ -51,6 +48,8 @@ def provenance(
     parts.append(repr(sorted(versions().items())))
     start = scenario.initial_weights() if include is None else None
     parts.append("" if start is None else start.tobytes().hex())
+    if include is None:
+        parts += [*scenario.law_content(), *([file_content(kind)] if is_named(kind) else [])]
     simulated = include is None or "simulation" in include
     driven = scenario.plant_vehicle() if simulated else None
     plant = "" if driven is None else driven.model_dump_json()

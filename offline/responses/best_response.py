@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 from casadi import DM
 
 from ...symbolic import Problem, RunError
@@ -190,7 +191,9 @@ class BestResponse:
         return self._responders[degree]
 
 
-def saddle_gap(problem: Problem, zeta0: Array, settings: OfflineSettings | None = None) -> SaddleGap:
+def saddle_gap(
+    problem: Problem, zeta0: ArrayLike, settings: OfflineSettings | None = None
+) -> SaddleGap:
     """Return both players' best responses from one state; `BestResponse` is for many states.
 
     The path is that of the certified solve.
