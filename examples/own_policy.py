@@ -1,7 +1,7 @@
 """Control laws of one's own, of any problem: a function of the state, and an object with a memory.
 
-stationkeep compare SCENARIO --policy examples/own_policy.py:make
-stationkeep sweep SCENARIO --policies learned,examples/own_policy.py:integral
+`stationkeep compare SCENARIO --policy examples/own_policy.py:make` puts one beside the others, and
+`stationkeep sweep SCENARIO --policies learned,examples/own_policy.py:Integral` in a table.
 """
 
 from __future__ import annotations
@@ -27,7 +27,10 @@ def make(setup: Setup) -> Callable[[Array], Array]:
 
 
 class Integral(Feedback):
-    """The linear policy with integral action: u_1 = -K ζ - ω ∫ K ζ dt."""
+    """The linear policy with integral action: u_1 = -K ζ - ω ∫ K ζ dt.
+
+    Any object with `step(zeta, dt)`, `u_control` and `u_disturbance` will do.
+    """
 
     def __init__(self, setup: Setup, rate: float = 0.5) -> None:
         super().__init__(setup.problem)
@@ -40,15 +43,10 @@ class Integral(Feedback):
         return -self.K @ zeta + self.stored
 
 
-def integral(setup: Setup) -> Integral:
-    """Return the policy; it needs nothing but `step`, `u_control` and `u_disturbance`."""
-    return Integral(setup)
-
-
 def main() -> list[Array]:
     """Return where each ends on the two-state game under a constant disturbance."""
     setup, ends = Scenario.load(f"{__file__}:problem").setup(), []
-    for policy in (make(setup), integral(setup)):
+    for policy in (make(setup), Integral(setup)):
         run = simulate(
             problem, policy, [1.0, 0.0], 40.0, mode="disturbed", disturbance=lambda t, zeta: PUSH
         )

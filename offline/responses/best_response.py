@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 from casadi import DM
+from numpy.typing import ArrayLike
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array

@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 from typing import Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
 from casadi import SX
+from numpy.typing import ArrayLike
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
