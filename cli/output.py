@@ -38,6 +38,7 @@ def load_scenario(options: argparse.Namespace) -> Scenario:
     scenario = Scenario.load(options.scenario, options.overrides)
     scenario.setup()
     scenario.initial_weights()
+    scenario.critic_law()
     interrupt.check()
     return scenario
 

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from ...symbolic import StationKeeping
-from ..policies import CONTENDERS
+from ..policies import label_of
 from ..study import Comparison
 
 Table = tuple[list[str], list[list[str]]]
@@ -46,7 +46,7 @@ def summary(comparison: Comparison) -> Table:
     header += ["ended early"] if any(ended.values()) else []
     rows = [
         [
-            CONTENDERS[name].label,
+            label_of(name),
             *_judgement(comparison, name),
             *sizes(comparison, name),
             _number(metrics.policy_mean, ".0f"),
