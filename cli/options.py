@@ -70,10 +70,10 @@ def offline_options(command: argparse.ArgumentParser) -> None:
         "--state",
         action="append",
         metavar="X,Y,Z,PHI,...",
-        help="initial state, 12 numbers [m, rad, m/s, rad/s] (repeatable)",
+        help="initial state, one number for each state (repeatable)",
     )
     command.add_argument(
-        "--states", type=Path, metavar="FILE", help=".npy or CSV file of rows of 12 numbers"
+        "--states", type=Path, metavar="FILE", help=".npy or CSV file, a row for each initial state"
     )
     command.add_argument("--gammas", metavar="G,G,...", help=GAMMAS_HELP)
     command.add_argument(
@@ -100,7 +100,7 @@ def sweep_options(command: argparse.ArgumentParser) -> None:
     """Add the options of `sweep`."""
     options: dict[str, tuple[str, str]] = {
         "--policies": ("NAME,...", "what drives the plant, FILE.py:MAKE too (default: learned,linear)"),
-        "--states": ("N|FILE", "N random states of the envelope, or a .npy or CSV file of rows of 12"),
+        "--states": ("N|FILE", "N random states of the envelope, or a .npy or CSV file, a row each"),
         "--scales": ("S,S,...", "parts of the envelope; the same as --vary envelope.scale=S,S,..."),
         "--sampling": ("KIND", "of ranges: random, latin (default) or sobol"),
         "--samples": ("N", "number of points at which the ranges are sampled"),
