@@ -19,6 +19,13 @@ def compare_options(command: argparse.ArgumentParser) -> None:
         help="compare from N states: the scenario's, and N - 1 of the envelope (default: 10)",
     )
     command.add_argument(
+        "--policy",
+        action="append",
+        default=[],
+        metavar="FILE.py:MAKE",
+        help="also a control law of your own, make(setup) in a Python file (repeatable)",
+    )
+    command.add_argument(
         "--field",
         metavar="STATE,STATE",
         help="draw the Bellman error over these two states (default: the first two, x,y)",
@@ -63,10 +70,10 @@ def offline_options(command: argparse.ArgumentParser) -> None:
         "--state",
         action="append",
         metavar="X,Y,Z,PHI,...",
-        help="initial state, 12 numbers [m, rad, m/s, rad/s] (repeatable)",
+        help="initial state, one number for each state (repeatable)",
     )
     command.add_argument(
-        "--states", type=Path, metavar="FILE", help=".npy or CSV file of rows of 12 numbers"
+        "--states", type=Path, metavar="FILE", help=".npy or CSV file, a row for each initial state"
     )
     command.add_argument("--gammas", metavar="G,G,...", help=GAMMAS_HELP)
     command.add_argument(
@@ -92,8 +99,8 @@ def offline_options(command: argparse.ArgumentParser) -> None:
 def sweep_options(command: argparse.ArgumentParser) -> None:
     """Add the options of `sweep`."""
     options: dict[str, tuple[str, str]] = {
-        "--policies": ("NAME,...", "what drives the vehicle (default: learned,linear)"),
-        "--states": ("N|FILE", "N random states of the envelope, or a .npy or CSV file of rows of 12"),
+        "--policies": ("NAME,...", "what drives the plant, FILE.py:MAKE too (default: learned,linear)"),
+        "--states": ("N|FILE", "N random states of the envelope, or a .npy or CSV file, a row each"),
         "--scales": ("S,S,...", "parts of the envelope; the same as --vary envelope.scale=S,S,..."),
         "--sampling": ("KIND", "of ranges: random, latin (default) or sobol"),
         "--samples": ("N", "number of points at which the ranges are sampled"),

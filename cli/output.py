@@ -6,7 +6,6 @@ import argparse
 import json
 import math
 import sys
-import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -20,8 +19,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from ..comparison import Scenario
-from ..online.records import write_text, written_whole
-from ..symbolic import InputError
+from ..online.records import writable_folder, write_text, written_whole
 from . import interrupt
 
 SECONDS_BETWEEN_NOTES = 10.0
@@ -40,6 +38,7 @@ def load_scenario(options: argparse.Namespace) -> Scenario:
     scenario = Scenario.load(options.scenario, options.overrides)
     scenario.setup()
     scenario.initial_weights()
+    scenario.critic_law()
     interrupt.check()
     return scenario
 
@@ -53,15 +52,9 @@ def output_folder(options: argparse.Namespace) -> Path:
         If they can't.
     """
     chosen: Path | None = options.out
-    folder = chosen if chosen is not None else Path("results") / Path(options.scenario).stem
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError as error:
-        raise InputError(
-            f"the folder '{folder}' can't be written ({error.strerror}); choose another one with --out"
-        ) from None
+    return writable_folder(
+        chosen if chosen is not None else Path("results") / Path(options.scenario).stem
+    )
 
 
 @contextmanager

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..symbolic import InputError, StationKeeping
+from ..symbolic.pyfile import is_named
+from .policies import require_own
 from .report import Page, animate, draw_all, write_report
 from .scenario import Scenario
 from .study import Comparison, Field, Tell, compared
@@ -45,7 +47,9 @@ class Study(Comparison):
             draw_all(self, page)
         self.figures.update(pages[0].files)
         told("report", 0.0)
-        again = commands or (f"compare(scenario, states={self.n_states}, out=...).write_report()",)
+        own = [name for name in self.metrics if is_named(name)]
+        asked = f"states={self.n_states}, " + (f"policies={own}, " if own else "")
+        again = commands or (f"compare(scenario, {asked}out=...).write_report()",)
         return write_report(self.out / "report.html", self, *pages, again)
 
     def animate(self) -> Path:
@@ -65,6 +69,7 @@ def compare(
     *,
     states: int = 10,
     out: Path | str,
+    policies: Sequence[str] = (),
     field: str | None = None,
     workers: int = 1,
     tell: Tell | None = None,
@@ -76,6 +81,7 @@ def compare(
     scenario : what is run, or its name
     states : number of initial states: the scenario's own, and seeded ones of its envelope
     out : folder of the records, later of the figures and the report
+    policies : of one's own that take part from every state, each as "file.py:make"
     field : two states, 'x,y', over which the Bellman error is drawn; the first two if None
     workers : processes that run at the same time
     tell : called with the name of the present stage and the part of it that is done
@@ -83,7 +89,7 @@ def compare(
     Raises
     ------
     InputError
-        If a number is not positive, a state is not known, or the scenario breaks a rule.
+        If a number is not positive, a state is not known, or the scenario or a policy breaks a rule.
     RunError
         If the offline solver does not converge from the scenario's own state, or a worker was lost.
 
@@ -98,9 +104,10 @@ def compare(
             raise InputError(f"the {name} is {number}, but must be at least 1")
     if isinstance(scenario, str):
         scenario = Scenario.load(scenario)
+    require_own(policies, scenario.setup())
     over, folder = Field.of(field, scenario.setup().problem), Path(out)
     told = _silent if tell is None else tell
-    found = compared(scenario, states, over, folder / "records", workers, told)
+    found = compared(scenario, states, policies, over, folder / "records", workers, told)
     return Study(**vars(found), out=folder)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..symbolic import Problem, RunError
 from ..symbolic.arrays import Array
@@ -189,6 +190,8 @@ class OfflineSolver:
         return SaddleSolver(self.problem, horizon=self.horizon)
 
 
-def solve(problem: Problem, zeta0: Array, settings: OfflineSettings | None = None) -> OfflineSolution:
+def solve(
+    problem: Problem, zeta0: ArrayLike, settings: OfflineSettings | None = None
+) -> OfflineSolution:
     """Return the certified optimum of a game from one state; see `OfflineSolver` for many."""
-    return OfflineSolver(problem, settings).solve(zeta0)
+    return OfflineSolver(problem, settings).solve(problem.require_state(zeta0))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .errors import InputError
+from .errors import InputError, StationkeepError
 
 
 def is_named(text: str) -> bool:
@@ -48,8 +48,19 @@ def find_callable(text: str, what: str) -> Callable[..., Any]:
     """Return the function that 'path/to/file.py:name' names; raises as `find_attribute`."""
     found = find_attribute(text, what)
     if not callable(found):
-        raise InputError(f"'{text}' is no function; give {what} as file.py:function")
+        file, _, attribute = text.rpartition(":")
+        raise InputError(f"'{file}' has no function '{attribute}'; give {what} as file.py:function")
     return found  # type: ignore[no-any-return]
+
+
+def called(function: Callable[..., Any], text: str, *arguments: object) -> Any:
+    """Return what the function that `text` names gives; raises InputError for what it raises."""
+    try:
+        return function(*arguments)
+    except StationkeepError:
+        raise
+    except Exception as error:
+        raise InputError(f"'{text}' raises {one_line(error)}") from error
 
 
 def file_content(text: str) -> str:

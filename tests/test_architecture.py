@@ -205,7 +205,7 @@ def test_every_package_is_shipped() -> None:
 
 def written_files() -> list[Path]:
     """Return the text files of the project, without what tools leave behind."""
-    folders = [*MAY_IMPORT, "api", "tests", "docs", "benchmarks", ".ci", ".github"]
+    folders = [*MAY_IMPORT, "api", "tests", "docs", "benchmarks", "examples", ".ci", ".github"]
     found = [path for path in ROOT.iterdir() if path.is_file()]
     found += [path for folder in folders for path in (ROOT / folder).rglob("*")]
     kinds = (".py", ".toml", ".md", ".yml", ".yaml", ".cfg", ".txt", ".sh", ".html", "")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from stationkeep.comparison.records import runs
+from stationkeep.online import load
 from stationkeep.symbolic import InputError
 
 from .commands import LOOSE, QUICK, ROUGH, call, files_in, run, sets
@@ -44,7 +45,7 @@ def test_a_file_in_place_of_the_folder(
     def refuse(*_: object, **__: object) -> None:
         pytest.fail("the run was made before the folder of the results was looked at")
 
-    monkeypatch.setattr(runs, "run", refuse)
+    monkeypatch.setattr(runs, "closed_loop", refuse)
     monkeypatch.setattr(runs, "optimum_to_dataset", refuse)
     (user_folder / "taken").write_text("mine", encoding="utf-8")
     answer = call(capsys, command, "--quiet", "--out", out, *SHORT, *sets(*ROUGH))
@@ -122,8 +123,8 @@ def test_a_record_that_is_broken_is_made_again(
     broken = user_folder / "out" / "learned.nc"
     broken.write_bytes(record.read_bytes()[:15_000])
     with pytest.raises(InputError, match="can't be read as a record"):
-        runs.load(broken)
+        load(broken)
     answer = call(capsys, "online", "--quiet", "--json", "--out", "out", *SHORT)
     assert answer.code == 0
     assert answer.err == ""
-    assert runs.load(broken).attrs["stopped"] == ""
+    assert load(broken).attrs["stopped"] == ""

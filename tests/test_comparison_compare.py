@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from stationkeep.comparison import Scenario, Study, check, compare
 from stationkeep.comparison.merit import Regret, RunMetrics
+from stationkeep.comparison.report import summary
 from stationkeep.comparison.report.figures import groups_by_unit
 from stationkeep.comparison.study import Field
 from stationkeep.comparison.study.reference import ClairvoyantOptimum, GameOptimum, Optimum
@@ -208,3 +209,15 @@ def test_verdicts_with_and_without_an_optimum(study: Study) -> None:
     assert "costs 20.0 % less than the linear" in unseen  # 100 against 125
     lost = {**regrets, "learned": Regret.of([None])}
     assert "ended early" in GameOptimum(record, optima).verdict(lost, runs)
+
+
+def test_a_failed_run_is_infinite_in_the_table(study: Study) -> None:
+    """The median of a finished and a failed run is the upper one, and no number."""
+    failed = dataclasses.replace(RUN, cost=None, running_cost=None, regret=None, stopped="lost")
+    runs = {name: list(runs) for name, runs in study.all_metrics.items()}
+    runs["lqr"][1] = failed
+    header, rows = summary(dataclasses.replace(study, all_metrics=runs))
+    (row,) = [row for row in rows if row[0] == "LQR"]
+    told = dict(zip(header, row, strict=True))
+    assert (told["median [%]"], told["worst [%]"]) == ("∞", "∞")
+    assert told["ended early"] == "1 of 2: lost"

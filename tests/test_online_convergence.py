@@ -223,6 +223,9 @@ class SamePlant:
     def initial_weights(self) -> Array | None:
         return None
 
+    def critic_law(self) -> None:
+        return None
+
     def plant_vehicle(self) -> None:
         return None
 

@@ -36,6 +36,7 @@ def run(options: argparse.Namespace) -> int:
             scenario,
             states=options.n_states,
             out=folder,
+            policies=options.policy,
             field=options.field,
             workers=options.workers or default_workers(),
             tell=tell,
@@ -95,6 +96,7 @@ def _commands(options: argparse.Namespace) -> list[str]:
     """Return the commands that give the same numbers again."""
     settings = [word for override in options.overrides for word in ("--set", override)]
     count = ["--n-states", str(options.n_states)]
+    count += [word for name in options.policy for word in ("--policy", name)]
     return [
         shlex.join(["stationkeep", command, options.scenario, *settings, *extra])
         for command, extra in (("compare", count), ("online", []), ("offline", []), ("check", []))

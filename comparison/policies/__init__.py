@@ -1,7 +1,15 @@
 """The policies that are compared, by name."""
 
 from .baselines import LQR, LinearPolicy, OnVehicle
-from .contenders import CONTENDERS, AnyPolicy, Contender, available, contender
+from .contenders import (
+    CONTENDERS,
+    AnyPolicy,
+    Contender,
+    available,
+    contender,
+    label_of,
+    require_own,
+)
 
 __all__ = [
     "CONTENDERS",
@@ -12,4 +20,6 @@ __all__ = [
     "OnVehicle",
     "available",
     "contender",
+    "label_of",
+    "require_own",
 ]

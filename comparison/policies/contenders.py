@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import PurePath
 from typing import Any
 
-from ...online import AS_PRINTED, Controller, FunctionPolicy, LearnedPolicy, Policy, VehiclePolicy
+from ...online import AS_PRINTED, Controller, LearnedPolicy, Policy, VehiclePolicy
 from ...symbolic import InputError, Setup, StationKeeping
 from ...symbolic.errors import nearest
-from ...symbolic.pyfile import find_callable, is_named
-from ..scenario import Scenario, named_in
+from ...symbolic.pyfile import is_named
+from ..scenario import Scenario
 from .baselines import LQR, LinearPolicy, OnVehicle
 from .mpc import ModelPredictive
+from .own import law_of
 from .pid import CascadedPID
 
 # what the paper's plain choices make of a scenario
@@ -92,7 +94,7 @@ def contender(name: str) -> Contender:
         If there is none of that name; the nearest one is given. Or if the file can't be loaded.
     """
     if is_named(name):
-        return Contender(name.rpartition(":")[2], _from_file(name))
+        return Contender(label_of(name), law_of(name))
     if name not in CONTENDERS:
         raise InputError(
             f"there is no policy '{name}': {nearest(name, CONTENDERS)} (or give file.py:function)"
@@ -100,18 +102,31 @@ def contender(name: str) -> Contender:
     return CONTENDERS[name]
 
 
-def _from_file(name: str) -> Callable[[Setup], Policy]:
-    make = find_callable(named_in(None, name), "the policy")
+def label_of(name: str) -> str:
+    """Return what figures and tables call a contender; one's own is called as its function or its file.
 
-    def law(setup: Setup) -> Policy:
-        made = make(setup)
-        if all(hasattr(made, name) for name in ("step", "u_control", "u_disturbance")):
-            return made  # type: ignore[no-any-return]
-        if not callable(made):
+    The file's name where the function is called `make`.
+    """
+    if not is_named(name):
+        return CONTENDERS[name].label
+    file, _, function = name.rpartition(":")
+    return PurePath(file).stem if function == "make" else function
+
+
+def require_own(names: Iterable[str], setup: Setup) -> None:
+    """Raise InputError unless these are policies of one's own that can be made and told apart."""
+    labels = [one.label for one in CONTENDERS.values()]
+    for name in names:
+        if not is_named(name):
             raise InputError(
-                f"'{name}' returns a {type(made).__name__}, but must return a function of the state, "
-                "or an object with step(zeta, dt), u_control and u_disturbance"
+                f"'{name}' is no policy of your own, and the shipped ones take part anyway; give "
+                "file.py:function"
             )
-        return FunctionPolicy(setup.problem, made)
-
-    return law
+        law = contender(name).law
+        assert law is not None
+        law(setup)
+        if label_of(name) in labels:
+            raise InputError(
+                f"two policies are called '{label_of(name)}'; rename '{name}', its file or its function"
+            )
+        labels.append(label_of(name))

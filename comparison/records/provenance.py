@@ -12,6 +12,7 @@ import numpy as np
 from ...online.records import versions
 from ...symbolic import Setup, StationKeeping
 from ...symbolic.game import problem_to_data
+from ...symbolic.pyfile import file_content, is_named
 from ..scenario import Scenario
 from .store import key_of
 
@@ -36,6 +37,8 @@ def provenance(
     parts.append(repr(sorted(versions().items())))
     start = scenario.initial_weights() if include is None else None
     parts.append("" if start is None else start.tobytes().hex())
+    if include is None:
+        parts += [*scenario.law_content(), *([file_content(kind)] if is_named(kind) else [])]
     simulated = include is None or "simulation" in include
     driven = scenario.plant_vehicle() if simulated else None
     plant = "" if driven is None else driven.model_dump_json()

@@ -54,6 +54,8 @@ def files_of(record: xr.Dataset, scenario: Scenario) -> Files:
         if BASIS in record:
             data = as_settings(str(record[BASIS].values), "basis")
             bases[scenario.basis.name] = from_data(data)
+        elif ":" in scenario.basis.name:
+            raise KeyError(BASIS)  # its file is not looked for
     except KeyError as error:
         raise InputError(f"the record has no attribute {error}; make it again") from None
     weights = np.array(record[WEIGHTS].values, dtype=np.float64) if WEIGHTS in record else None

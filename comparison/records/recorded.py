@@ -14,6 +14,7 @@ from ...online.loop import Progress
 from ...online.records import read_parts
 from ...symbolic import InputError
 from ...symbolic.arrays import Array
+from ...symbolic.pyfile import is_named
 from ...symbolic.toml import validate
 from ..policies import CONTENDERS
 from ..scenario import Scenario, restored
@@ -90,10 +91,16 @@ def run_again(record: xr.Dataset, folder: Path, progress: Progress | None = None
     Raises
     ------
     InputError
-        If the record can't be read by this version, or the one it started from is gone.
+        If the record can't be read by this version, its learner had a law of the user's own, or the
+        record that an optimum started from is gone.
     """
     scenario, kind = recorded_scenario(record), str(record.attrs["kind"])
     if kind in CONTENDERS:
+        if CONTENDERS[kind].law is None and is_named(scenario.learner.rule):
+            raise InputError(
+                f"the run learned by the law '{scenario.learner.rule}', which is a program and so no "
+                "part of its record; make the run again with 'stationkeep online' or 'compare'"
+            )
         make, duration = CONTENDERS[kind].make, scenario.simulation.duration
         tell = None if progress is None else lambda t: progress(t / duration)
         return online_record(scenario, policy=lambda: make(scenario), kind=kind, progress=tell)

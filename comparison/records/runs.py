@@ -13,9 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ...offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
-from ...online import (
-    to_dataset,
-)
+from ...online import to_dataset
 from ...online.loop import Progress
 from ...online.records import listed, versions
 from ...symbolic import RunError, Setup, StationKeeping

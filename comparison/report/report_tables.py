@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import xarray as xr
 
 from ...symbolic import StationKeeping
-from ..policies import CONTENDERS
+from ..policies import label_of
 from ..study import Comparison
 
 Table = tuple[list[str], list[list[str]]]
@@ -44,7 +46,7 @@ def summary(comparison: Comparison) -> Table:
     header += ["ended early"] if any(ended.values()) else []
     rows = [
         [
-            CONTENDERS[name].label,
+            label_of(name),
             *_judgement(comparison, name),
             *sizes(comparison, name),
             _number(metrics.policy_mean, ".0f"),
@@ -143,4 +145,7 @@ def conditions(comparison: Comparison) -> Table:
 
 
 def _number(value: float | None, form: str, factor: float = 1.0) -> str:
-    return "–" if value is None else f"{factor * value:{form}}"
+    """Return a number in words: a dash where it is not known, ∞ for what failed."""
+    if value is None:
+        return "–"
+    return f"{factor * value:{form}}" if math.isfinite(value) else "∞"

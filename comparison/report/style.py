@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import cycle
 from pathlib import Path
 
 import matplotlib as mpl
@@ -30,6 +31,7 @@ COLORS = {
     "quadratic": "#e08a63",
     "gradient": "#4d4d4d",
 }
+OWN = ("#7b2cbf", "#6a994e", "#4d9de0", "#b0a18f")  # policies of the user's, in their order
 WIDE, NARROW = 9.0, 4.4  # inches: a page, and a phone
 
 _LOOK = {
@@ -109,6 +111,12 @@ class Page:
         with written_whole(self.folder / f"{name}.pdf") as temporary:
             # without a date the same numbers give the same file
             sheet.savefig(temporary, format="pdf", metadata={"CreationDate": None})
+
+
+def colors_of(names: Iterable[str]) -> dict[str, str]:
+    """Return the colour of each policy: those of the user's own have the four of `OWN` in turn."""
+    own = cycle(OWN)
+    return {name: COLORS[name] if name in COLORS else next(own) for name in names}
 
 
 def pair(learned: xr.Dataset, optimal: xr.Dataset) -> list[tuple[xr.Dataset, str, str, str]]:

@@ -9,9 +9,9 @@ from matplotlib.ticker import StrMethodFormatter
 
 from ...symbolic.arrays import Array
 from ..merit import Regret, RunMetrics, cost_to_date
-from ..policies import CONTENDERS
+from ..policies import label_of
 from ..study import Comparison
-from .style import COLORS, OPTIMAL, Page, legend_below, time_axis
+from .style import OPTIMAL, Page, colors_of, legend_below, time_axis
 
 
 def draw_cost(page: Page, comparison: Comparison) -> None:
@@ -20,7 +20,7 @@ def draw_cost(page: Page, comparison: Comparison) -> None:
     Without the optimum that regret refers to the linear policy takes its place. The second panel is
     cut where policies end that are far worse than the linear one.
     """
-    records = comparison.records
+    records, colors = comparison.records, colors_of(comparison.metrics)
     end = max(float(record["time"][-1]) for record in records.values())
     above, unit = _above(comparison)
     last = {name: float(values[-1]) for name, (_, values) in above.items() if len(values)}
@@ -31,12 +31,12 @@ def draw_cost(page: Page, comparison: Comparison) -> None:
         for name, record in records.items():
             early = comparison.metrics[name].stopped
             outcome = "ended early" if early else f"{last.get(name, np.nan):.2f} {unit}"
-            label = f"{CONTENDERS[name].label}, {outcome}"
+            label = f"{label_of(name)}, {outcome}"
             layer = 3 if name == "learned" else 2
             total.plot(
-                record["time"], cost_to_date(record), label=label, color=COLORS[name], zorder=layer
+                record["time"], cost_to_date(record), label=label, color=colors[name], zorder=layer
             )
-            excess.plot(*above[name], color=COLORS[name], zorder=layer)
+            excess.plot(*above[name], color=colors[name], zorder=layer)
         if known:
             best = comparison.shown
             total.plot(best["time"], best["cost"], "--", color=OPTIMAL, label=optimum, zorder=4)
@@ -60,15 +60,15 @@ def draw_regrets(page: Page, comparison: Comparison) -> None:
     """Draw the regret of each policy from every state, with its median."""
     found = {name: regrets for name, regrets in comparison.regrets.items() if len(regrets) > 1}
     found = found or comparison.regrets
-    count = comparison.n_states
+    count, colors = comparison.n_states, colors_of(comparison.metrics)
     states = "one state" if count == 1 else f"{count} states"
     title = f"Regret from {states}: how much dearer than the {comparison.reference.name}"
     with page.figure("regret", title, 1, 1, 0.42 * len(found) + 1.6) as (axes,):
         for row, (name, regrets) in enumerate(found.items()):
             percent = 100.0 * np.array([r for r in regrets if r is not None and r > 0.0])
             spread = np.linspace(-0.22, 0.22, len(percent)) if len(percent) > 1 else [0.0]
-            axes.plot(percent, row + np.array(spread[: len(percent)]), "o", color=COLORS[name], ms=4)
-            label = CONTENDERS[name].label
+            axes.plot(percent, row + np.array(spread[: len(percent)]), "o", color=colors[name], ms=4)
+            label = label_of(name)
             middle = 100.0 * Regret.of(regrets).median
             if 0.0 < middle < math.inf:
                 axes.plot([middle] * 2, [row - 0.36, row + 0.36], color="black", lw=2.0)
@@ -95,6 +95,7 @@ def draw_energy(page: Page, comparison: Comparison) -> None:
     From each state the quotients of energy, or of effort where the power of the thrusters is not known,
     and of the rms distance; medians, and 10 to 90 % of the states.
     """
+    colors = colors_of(comparison.metrics)
     electrical = all(run.energy is not None for runs in comparison.all_metrics.values() for run in runs)
     with page.figure("energy", "Energy against accuracy, linear H-infinity = 1", 1, 1, 4.2) as (axes,):
         for name, runs in comparison.all_metrics.items():
@@ -118,8 +119,8 @@ def draw_energy(page: Page, comparison: Comparison) -> None:
                 fmt="o",
                 ms=7,
                 elinewidth=0.8,
-                color=COLORS[name],
-                label=CONTENDERS[name].label + ("" if len(pairs) == len(runs) else " *"),
+                color=colors[name],
+                label=label_of(name) + ("" if len(pairs) == len(runs) else " *"),
             )
         axes.set_xlabel("electrical energy [-]" if electrical else "effort ∫|force|² dt [-]")
         axes.set_ylabel("distance from the station, rms [-]")

@@ -20,7 +20,7 @@ from ...symbolic import (
 )
 from ...symbolic.arrays import Array, Vector3
 from ...symbolic.game import gamma_star, weight_matrix
-from ...symbolic.pyfile import find_attribute
+from ...symbolic.pyfile import called, find_attribute
 from ...symbolic.value import BasisFunction
 from .settings import EnvelopeSettings, GameSettings
 
@@ -35,13 +35,7 @@ def find_problem(text: str) -> Problem:
     """
     found = find_attribute(text, "the problem")
     if callable(found) and not isinstance(found, Problem):
-        try:
-            found = found()
-        except InputError:
-            raise
-        except Exception as error:
-            reason = " ".join(str(error).split())
-            raise InputError(f"'{text}' raises {type(error).__name__}: {reason}") from error
+        found = called(found, text)
     if not isinstance(found, Problem):
         raise InputError(
             f"'{text}' is a {type(found).__name__}, but must be a stationkeep Problem or a function "

@@ -4,10 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 from ...symbolic import Problem, Vehicle
 from ...symbolic.arrays import Array
+from ...symbolic.pyfile import is_named
+from ...symbolic.toml import locate, read_toml
 from ...symbolic.value import BasisFunction
+
+
+def read_settings(name: str | Path) -> tuple[dict[str, Any], Path | None]:
+    """Return the settings of a scenario's file and its folder; a problem's name is its only setting."""
+    if isinstance(name, str) and is_named(name):
+        return {"problem": name}, None
+    path = locate(name, str(__package__), "scenarios", "scenario")
+    return read_toml(path), path.parent
 
 
 @dataclass(frozen=True)

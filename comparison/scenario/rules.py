@@ -32,7 +32,8 @@ def require_keys(scenario: BaseModel, problem: str | None) -> None:
     if problem is None:
         for group, key in VEHICLE_NEEDS:
             if getattr(getattr(scenario, group), key) is None:
-                raise ValueError(f"the key '{group}.{key}' is required and missing; add it")
+                missing = f"{group}.{key}" if group in scenario.model_fields_set else group
+                raise ValueError(f"the key '{missing}' is required and missing; add it")
         return
     unused = next(_vehicle_only(scenario), None)
     if unused is not None:

@@ -13,6 +13,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from ...offline import OfflineSettings
 from ...online import LearnerSettings, SampleSettings, SimulationSettings, load_weights
+from ...online.laws import Critic
 from ...symbolic import (
     InputError,
     Model,
@@ -23,13 +24,14 @@ from ...symbolic import (
     require_vehicle_state,
 )
 from ...symbolic.arrays import Array, Vector3
-from ...symbolic.pyfile import is_named
-from ...symbolic.toml import Settings, locate, read_toml, shipped_names, validate
+from ...symbolic.pyfile import file_content
+from ...symbolic.toml import Settings, shipped_names, validate
 from ...symbolic.underwater import STATE_NAMES
 from ...symbolic.value import BasisFunction
 from .building import file_in, find_problem, named_in, problem_setup, vehicle_problem, vehicle_setup
 from .defaults import problem_defaults
-from .files import Files
+from .files import Files, read_settings
+from .laws import made_law
 from .overrides import override, replace_value
 from .rules import require_keys, require_level, require_start
 from .settings import BasisSettings, EnvelopeSettings, GameSettings
@@ -67,9 +69,10 @@ class Scenario(Settings):
 
     @model_validator(mode="after")
     def _one_plant(self) -> Scenario:
-        if (self.vehicle is None) == (self.problem is None):
-            given = "both" if self.vehicle is not None else "neither"
-            raise ValueError(f"{given} 'vehicle' and 'problem' are given; give one of the two")
+        if self.vehicle is None and self.problem is None:
+            raise ValueError("the key 'vehicle' is required and missing; add it, or a 'problem'")
+        if self.vehicle is not None and self.problem is not None:
+            raise ValueError("both 'vehicle' and 'problem' are given; give one of the two")
         require_keys(self, self.problem)
         return self
 
@@ -86,7 +89,7 @@ class Scenario(Settings):
         InputError
             If there is no such scenario or it breaks a rule; one sentence says which.
         """
-        data, folder = _read(name)
+        data, folder = read_settings(name)
         for text in overrides:
             override(data, text)
         files = Files()
@@ -229,7 +232,18 @@ class Scenario(Settings):
         paths = [self._path(name) for name, separator, _ in named if separator]
         if self.learner.weights != "riccati":
             paths.append(self._path(self.learner.weights))
-        return [path.read_bytes().hex() for path in paths if path.is_file()]
+        contents = [path.read_bytes().hex() for path in paths if path.is_file()]
+        return [*contents, *self.law_content()]
+
+    def law_content(self) -> list[str]:
+        """Return what is in the file of a user's critic law, hexadecimal; nothing for a shipped one."""
+        rule = self.learner.rule
+        return [file_content(named_in(self._folder, rule))] if ":" in rule else []
+
+    def critic_law(self) -> Critic | None:
+        """Return a new critic law from a user's file, None for a shipped `rule`; raises InputError."""
+        rule = self.learner.rule
+        return made_law(named_in(self._folder, rule), self._setup) if ":" in rule else None
 
     def basis_function(self) -> BasisFunction:
         """Return σ as a function of the scaled state; raises InputError if it can't be found."""
@@ -275,14 +289,6 @@ class Scenario(Settings):
 
     def _path(self, text: str) -> Path:
         return file_in(self._folder, text)
-
-
-def _read(name: str | Path) -> tuple[dict[str, Any], Path | None]:
-    """Return the settings of a scenario's file and its folder; a problem's name is its only setting."""
-    if isinstance(name, str) and is_named(name):
-        return {"problem": name}, None
-    path = locate(name, __package__, "scenarios", "scenario")
-    return read_toml(path), path.parent
 
 
 def restored(text: str, folder: Path | None, files: Files) -> Scenario:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,9 +11,10 @@ import xarray as xr
 
 from ...offline import OfflineSolver
 from ...symbolic import RunError, Setup
+from ...symbolic.pyfile import is_named
 from ..merit import RunMetrics, regret, run_metrics
 from ..parallel import Work, run_tasks
-from ..policies import available
+from ..policies import available, label_of
 from ..records import KIND as CLAIRVOYANT
 from ..records import clairvoyant_record, contender_record, optimal_record
 from ..scenario import Scenario
@@ -38,14 +39,17 @@ class ComparedRuns:
     optima: dict[str, list[Optimum]]
 
 
-def policies(setup: Setup) -> list[str]:
-    """Return the names of the policies for a problem, those that are run from every state first."""
-    return sorted(available(setup), key=lambda name: name in ALONE)
+def policies(setup: Setup, own: Sequence[str] = ()) -> list[str]:
+    """Return the names of the policies for a problem, those that are run from every state first.
+
+    `own`: "file.py:make" of the user's.
+    """
+    return sorted([*available(setup), *own], key=lambda name: name in ALONE)
 
 
-def everywhere(setup: Setup) -> list[str]:
+def everywhere(setup: Setup, own: Sequence[str] = ()) -> list[str]:
     """Return the names of the policies that are run from every state."""
-    return [name for name in policies(setup) if name not in ALONE]
+    return [name for name in policies(setup, own) if name not in ALONE]
 
 
 @dataclass(frozen=True)
@@ -56,8 +60,10 @@ class _Task:
     what: str
 
 
-def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell) -> ComparedRuns:
-    """Make all records, or reuse those in `folder`.
+def make_all(
+    scenarios: list[Scenario], own: Sequence[str], folder: Path, n_workers: int, tell: Tell
+) -> ComparedRuns:
+    """Make all records, or reuse those in `folder`, with policies of the user's `own`.
 
     Raises
     ------
@@ -68,7 +74,7 @@ def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
     tasks = [
         _Task(state, what)
         for state in range(len(scenarios))
-        for what in (*reference.solved, *(everywhere(setup) if state else policies(setup)))
+        for what in (*reference.solved, *(everywhere if state else policies)(setup, own))
     ]
     answers: dict[_Task, RunMetrics | Optimum] = {}
     tell("runs", 0.0)
@@ -79,7 +85,7 @@ def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
             answers[tasks[event.task]] = event.message
             tell("runs", len(answers) / len(tasks))
     found: dict[str, list[Optimum]] = {kind: [] for kind in reference.solved}
-    metrics: dict[str, list[RunMetrics]] = {name: [] for name in policies(setup)}
+    metrics: dict[str, list[RunMetrics]] = {name: [] for name in policies(setup, own)}
     for task in tasks:
         answer = answers[task]
         if isinstance(answer, Optimum):
@@ -94,6 +100,7 @@ def make_all(scenarios: list[Scenario], folder: Path, n_workers: int, tell: Tell
 
 def record_path(folder: Path, state: int, what: str) -> Path:
     """Return where the record of a policy, or of an optimum, from one of the states is kept."""
+    what = f"own-{label_of(what)}" if is_named(what) else what
     return folder / (f"state-{state + 1}-{what}.nc" if state else f"{what}.nc")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from ...online import draw_samples, load
 from ...symbolic import RunError, Setup
 from ..merit import Regret, RunMetrics
 from ..optima import Ideal
-from ..policies import CONTENDERS
+from ..policies import label_of
 from ..scenario import Scenario
 from ..theory import Condition, Theory, run_conditions, scenario_conditions, theory
 from .analysis import Field, analysis_record, ideal_of
@@ -126,7 +127,7 @@ class Comparison:
             for name in TWO:
                 stopped = runs[name].stopped
                 if stopped:
-                    found.append(f"{where}{CONTENDERS[name].label}: {stopped}")
+                    found.append(f"{where}{label_of(name)}: {stopped}")
         return found
 
 
@@ -143,12 +144,13 @@ def scenarios_from(scenario: Scenario, n_states: int) -> list[Scenario]:
 def compared(
     scenario: Scenario,
     n_states: int,
+    own: Sequence[str],
     field: Field | None,
     folder: Path,
     n_workers: int,
     tell: Tell,
 ) -> Comparison:
-    """Run (or reuse from `folder`) every policy and the optimum from the same states.
+    """Run (or reuse from `folder`) every policy, the user's `own` too, and the optimum of each state.
 
     Raises
     ------
@@ -156,10 +158,10 @@ def compared(
         If the offline solver does not converge from the scenario's own state, or a worker was lost.
     """
     setup = scenario.setup()
-    made = make_all(scenarios_from(scenario, n_states), folder, n_workers, tell)
+    made = make_all(scenarios_from(scenario, n_states), own, folder, n_workers, tell)
     if made.optima[OPTIMUM][0].value is None:
         raise RunError(made.optima[OPTIMUM][0].fault)
-    records = {name: load(record_path(folder, 0, name)) for name in policies(setup)}
+    records = {name: load(record_path(folder, 0, name)) for name in policies(setup, own)}
     tell("errors along the way", 0.0)
     analysis = analysis_record(scenario, records["learned"], field, folder / "analysis.nc")
     ideal = ideal_of(setup, analysis)

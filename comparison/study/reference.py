@@ -16,7 +16,7 @@ import xarray as xr
 from ...offline import QuickValue
 from ...symbolic import Setup
 from ..merit import Regret, RunMetrics, dissipation_margin
-from ..policies import CONTENDERS
+from ..policies import label_of
 from ..records import KIND as CLAIRVOYANT
 from ..scenario import Scenario
 
@@ -182,7 +182,7 @@ class ClairvoyantOptimum(Reference):
         found = [optimum.fault] if optimum.fault else []
         for name, regret in regrets.items():
             if regret is not None and regret < -optimum.value_error:
-                found.append(f"the run of {CONTENDERS[name].label} costs {-100 * regret:.2g} % less")
+                found.append(f"the run of {label_of(name)} costs {-100 * regret:.2g} % less")
         return [f"{self.name}: {doubt}" for doubt in found]
 
     def margins(self, setup: Setup, records: Mapping[str, xr.Dataset]) -> dict[str, float]:

@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
+from ...online.records import writable_folder
 from ...symbolic import InputError, StationkeepError
 from ...symbolic.arrays import Array
 from ..parallel import Event, default_workers, locked, run_on_cluster, run_tasks
@@ -106,7 +107,7 @@ def sweep(
         kept=str(bench),
     )
     execute = _executor(workers, cluster)
-    folder = Path(out)
+    folder = writable_folder(Path(out))
     with locked(folder), closing(Sweep(plan, bench, folder)) as going:
         resumed = _all_runs(going, execute, told)
         csv, table = going.write_tables()

@@ -27,7 +27,7 @@ from ..scenario import Scenario
 from .vary import Choices, Range, varied
 
 Sampling = Literal["random", "latin", "sobol"]
-FILES = ("vehicle", "problem", "simulation.plant", "basis.name", "learner.weights")
+FILES = ("vehicle", "problem", "simulation.plant", "basis.name", "learner.weights", "learner.rule")
 
 
 def sampled(n_points: int, dimension: int, sampling: Sampling, seed: int) -> Array:

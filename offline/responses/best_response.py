@@ -22,6 +22,7 @@ from itertools import pairwise
 
 import numpy as np
 from casadi import DM
+from numpy.typing import ArrayLike
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
@@ -190,7 +191,9 @@ class BestResponse:
         return self._responders[degree]
 
 
-def saddle_gap(problem: Problem, zeta0: Array, settings: OfflineSettings | None = None) -> SaddleGap:
+def saddle_gap(
+    problem: Problem, zeta0: ArrayLike, settings: OfflineSettings | None = None
+) -> SaddleGap:
     """Return both players' best responses from one state; `BestResponse` is for many states.
 
     The path is that of the certified solve.

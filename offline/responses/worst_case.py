@@ -24,6 +24,7 @@ from typing import Unpack
 
 import numpy as np
 from casadi import SX
+from numpy.typing import ArrayLike
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
@@ -179,7 +180,7 @@ class WorstCaseSolver:
         return self._disturber.maximise(zeta0, mesh, guesses, _constant(self._level))
 
 
-def worst_case(problem: Problem, zeta0: Array, u_control: SX | None = None) -> WorstCase:
+def worst_case(problem: Problem, zeta0: ArrayLike, u_control: SX | None = None) -> WorstCase:
     """Return the worst case of a control policy from one state; `WorstCaseSolver` is for many states.
 
     Parameters
@@ -194,7 +195,7 @@ def worst_case(problem: Problem, zeta0: Array, u_control: SX | None = None) -> W
         If the policy is none, or the state is not n finite numbers inside the domain.
     """
     policy = linear_policy(problem) if u_control is None else u_control
-    return WorstCaseSolver(ControlPolicy(problem, policy)).solve(zeta0)
+    return WorstCaseSolver(ControlPolicy(problem, policy)).solve(problem.require_state(zeta0))
 
 
 def measured(

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
@@ -145,7 +146,7 @@ def default_gammas(problem: Problem) -> list[float]:
 
 def gamma_curve(
     problem: Problem,
-    zeta0: Array,
+    zeta0: ArrayLike,
     gammas: Sequence[float] | None = None,
     settings: OfflineSettings | None = None,
 ) -> GammaCurve:
@@ -164,4 +165,4 @@ def gamma_curve(
         As `GammaCurveSolver` and its `solve`.
     """
     horizon = horizon_of(problem, OfflineSettings() if settings is None else settings)
-    return GammaCurveSolver(problem, gammas, horizon=horizon).solve(zeta0)
+    return GammaCurveSolver(problem, gammas, horizon=horizon).solve(problem.require_state(zeta0))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...symbolic import ValueFunctions
+from ...symbolic import InputError, ValueFunctions
 from ...symbolic.arrays import Array
 from ..laws import Critic, Gradient, LeastSquares
 from ..paper import Projection
@@ -15,9 +15,13 @@ from .settings import LearnerSettings, SampleSettings
 
 
 def critic_law(settings: LearnerSettings, n_basis: int) -> Critic:
-    """Return the law that `rule` names."""
+    """Return the law that `rule` names; raises InputError for a user's, which a scenario makes."""
     if settings.rule == "gradient":
         return Gradient()
+    if settings.rule != "least_squares":
+        raise InputError(
+            f"the rule is '{settings.rule}', a law of its own; give that law to the learner as `critic`"
+        )
     return LeastSquares(n_basis, settings.forgetting, settings.covariance, settings.covariance_bound)
 
 

@@ -10,9 +10,11 @@ from pydantic import (
     NonNegativeInt,
     PositiveFloat,
     PositiveInt,
+    field_validator,
     model_validator,
 )
 
+from ...symbolic.pyfile import is_named
 from ...symbolic.toml import Settings
 from ..laws import Normalizer
 
@@ -27,6 +29,7 @@ AS_PRINTED: dict[str, Any] = {
     "gain_actor_2": 2.0,
 }
 """What makes a learner that of the paper: (16)-(21) as printed, nothing that holds the weights."""
+RULES = ("gradient", "least_squares")
 
 
 class LearnerSettings(Settings):
@@ -34,7 +37,8 @@ class LearnerSettings(Settings):
 
     Attributes
     ----------
-    rule : `gradient` is (19); `least_squares` is recursive, with forgetting
+    rule : `gradient` is (19); `least_squares` is recursive, with forgetting; or a user's critic law as
+        "file.py:make", where make(setup) returns a `laws.Critic`
     error : what the critic learns from: `bellman`, the Bellman error (17) at the samples, or `costate`,
         the error of its gradient's policy along predicted trajectories, see `rows.CostateSource`
     safeguard : move the actors only as far as the model predicts no higher cost, restart them from the
@@ -61,7 +65,7 @@ class LearnerSettings(Settings):
     weight_bound : projection bound as a multiple of the norm of the reference weights
     """
 
-    rule: Literal["gradient", "least_squares"] = "least_squares"
+    rule: str = "least_squares"
     error: Literal["bellman", "costate"] = "costate"
     safeguard: bool = True
     horizon: PositiveFloat = 30.0
@@ -86,6 +90,16 @@ class LearnerSettings(Settings):
     def as_printed(cls, **changes: Any) -> LearnerSettings:
         """Return the settings of the paper's learner, `AS_PRINTED`, with changes."""
         return cls.model_validate(AS_PRINTED | changes)
+
+    @field_validator("rule")
+    @classmethod
+    def _known(cls, rule: str) -> str:
+        if rule not in RULES and not is_named(rule):
+            raise ValueError(
+                f"there is no rule '{rule}', only 'gradient' and 'least_squares'; choose one of them "
+                "(or give file.py:function)"
+            )
+        return rule
 
     @model_validator(mode="after")
     def _consistent(self) -> LearnerSettings:

@@ -69,8 +69,9 @@ class FunctionPolicy(Feedback):
 
     def control(self, zeta: Array, dt: float) -> Array:
         """Return the function's value; raises InputError if it is not k numbers."""
+        given = self._function(zeta)
         try:
-            u_control = np.asarray(self._function(zeta), dtype=float)
+            u_control = np.asarray(given, dtype=float)
         except (TypeError, ValueError):
             u_control = np.zeros(0)
         k = self.problem.n_inputs

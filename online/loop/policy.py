@@ -8,6 +8,7 @@ import numpy as np
 
 from ...symbolic import InputError, Setup
 from ...symbolic.arrays import Array
+from ..laws import Critic
 from ..learning import Learner, LearnerSettings, LearnerStep, SampleSettings
 from ..rows import draw_samples
 
@@ -56,6 +57,10 @@ class LearnerScenario(Protocol):
         """Return the weights to start from, or None for weight_factor times the Riccati weights."""
         ...
 
+    def critic_law(self) -> Critic | None:
+        """Return a critic law of the user's own, or None for the one that the settings name."""
+        ...
+
 
 class LearnedPolicy:
     """The learner's policy, which learns whenever its period has passed.
@@ -92,6 +97,7 @@ class LearnedPolicy:
             setup.functions,
             scenario.samples,
             setup.envelope if learn and scenario.samples.remember else None,
+            scenario.critic_law(),
         )
         # nothing to certify where the frozen weights are the reference's own
         safeguarded = not learn and scenario.learner.safeguard

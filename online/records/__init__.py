@@ -1,6 +1,15 @@
 """The record of a run, and files that are written whole."""
 
-from .files import load, read_parts, remove_temporaries, save, versions, write_text, written_whole
+from .files import (
+    load,
+    read_parts,
+    remove_temporaries,
+    save,
+    versions,
+    writable_folder,
+    write_text,
+    written_whole,
+)
 from .record import listed, load_weights, to_dataset
 
 __all__ = [
@@ -12,6 +21,7 @@ __all__ = [
     "save",
     "to_dataset",
     "versions",
+    "writable_folder",
     "write_text",
     "written_whole",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import tempfile
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -77,6 +78,24 @@ def read_parts(path: Path, *names: str) -> tuple[dict[str, Any], dict[str, Array
             return attributes, {name: np.asarray(file[name]) for name in names}
     except (OSError, KeyError, ValueError):
         raise InputError(f"'{path}' can't be read as a record; make it again") from None
+
+
+def writable_folder(folder: Path) -> Path:
+    """Return a folder, made where it is not there, once it is sure that files can be written in it.
+
+    Raises
+    ------
+    InputError
+        If they can't.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        raise InputError(
+            f"the folder '{folder}' can't be written ({error.strerror}); choose another one with --out"
+        ) from None
 
 
 @contextmanager

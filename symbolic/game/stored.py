@@ -62,7 +62,7 @@ def problem_from_data(data: Mapping[str, Any]) -> Problem:
         results = equations.call(symbols)
         parts = {equations.name_out(i): result for i, result in enumerate(results)}
         given, weights = dict(zip(names, symbols, strict=True)), data["game"]
-        gamma = np.inf if weights["gamma"] is None else float(weights["gamma"])
+        gamma = np.inf if weights["gamma"] is None else float(_matrix(weights["gamma"]))
         inverse = None
         if "acceleration" in given:
             inverse = InverseDynamics(given["acceleration"], parts["inverse"])
