@@ -36,10 +36,10 @@ from .pages import (
 )
 from .test_wings import WINGS
 
-EVERY = [README, *PAGES, ROOT / "benchmarks" / "README.md"]
+EVERY = [README, *PAGES, *(ROOT / name / "README.md" for name in ("benchmarks", "examples"))]
 FOLDERS = "symbolic|online|offline|comparison|cli"
 GROUPS = "game|envelope|basis|learner|samples|simulation"
-FILES = re.compile(rf"(?:{FOLDERS}|api|benchmarks|tests|docs|\.ci)/[\w./-]*")
+FILES = re.compile(rf"(?:{FOLDERS}|api|benchmarks|examples|tests|docs|\.ci)/[\w./-]*")
 NAMES = re.compile(rf"(?:stationkeep|{FOLDERS}|{GROUPS})(?:\.[A-Za-z_]\w*(?:\[i\])?)+")
 
 

@@ -40,7 +40,7 @@ class LearnerSettings(Settings):
     rule : `gradient` is (19); `least_squares` is recursive, with forgetting; or a user's critic law as
         "file.py:make", where make(setup) returns a `laws.Critic`
     error : what the critic learns from: `bellman`, the Bellman error (17) at the samples, or `costate`,
-        the error of its gradient's policy along predicted trajectories, see `rows.CostateSource`
+        the error of its gradient's policy along predicted trajectories, see `rows.CostateRows`
     safeguard : move the actors only as far as the model predicts no higher cost, restart them from the
         reference weights where these are predicted to cost less, and use the linear H-infinity policy
         where that is
