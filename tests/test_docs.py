@@ -63,7 +63,7 @@ def test_blocks_run(page: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [p for p in [README, *PAGES] if is_slow(p)], ids=name_of)
 def test_slow_blocks_run(page: Path, tmp_path: Path) -> None:
-    runs(program(read(page), slow=True), tmp_path, 900)
+    runs(program(read(page), slow=True), tmp_path, 1800)
 
 
 @pytest.mark.parametrize("page", [p for p in [README, *PAGES] if read(p)], ids=name_of)
