@@ -20,9 +20,9 @@ PUSH = np.array([0.5])
 
 
 def make(setup: Setup) -> Callable[[Array], Array]:
-    """Return the linear policy that asks for no more than half of what it asks for at the envelope."""
+    """Return the linear policy cut at a quarter of what it asks for at the envelope."""
     K, _ = setup.problem.linear_gains
-    most = 0.5 * np.abs(K) @ setup.envelope
+    most = 0.25 * np.abs(K) @ setup.envelope
     return lambda zeta: np.clip(-K @ zeta, -most, most)
 
 

@@ -149,7 +149,7 @@ def test_a_law_is_found_beside_the_scenario(
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("number", "returns a int"), ("none", "has no function"), ("steps", "is no function")],
+    [("number", "returns a int"), ("none", "has no function"), ("steps", "no function .steps.")],
 )
 def test_what_is_no_law_is_refused(name: str, words: str, files: Path, one_sentence: Check) -> None:
     with pytest.raises(InputError, match=words) as caught:
