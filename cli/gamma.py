@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from ..comparison.report import draw_gamma_curves
 from ..offline import GammaCurve, GammaCurveSolver
 from ..symbolic import InputError, Problem
 from .output import print_table, progress
@@ -67,6 +66,8 @@ class Curves:
     def draw(self, folder: Path) -> None:
         """Draw the first curves in one figure; nothing if there are none."""
         if self._curves:
+            from ..comparison.report import draw_gamma_curves  # and with it matplotlib
+
             draw_gamma_curves(folder / "gamma-curve.png", self._curves)
 
     def show(self) -> None:

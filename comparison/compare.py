@@ -9,7 +9,6 @@ from pathlib import Path
 from ..symbolic import InputError, StationKeeping
 from ..symbolic.pyfile import is_named
 from .policies import require_own
-from .report import Page, animate, draw_all, write_report
 from .scenario import Scenario
 from .study import Comparison, Field, Tell, compared
 
@@ -40,6 +39,8 @@ class Study(Comparison):
         InputError
             If the folder can't be written.
         """
+        from .report import Page, draw_all, write_report  # and with it matplotlib
+
         told = _silent if tell is None else tell
         pages = (Page(self.out / "figures"), Page(None))
         for i, page in enumerate(pages):
@@ -60,6 +61,8 @@ class Study(Comparison):
         InputError
             If the problem is no vehicle, or matplotlib finds nothing that writes a film.
         """
+        from .report import animate
+
         require_film(self.scenario)
         return animate(self.out / "figures", self.records["learned"], self.shown)
 

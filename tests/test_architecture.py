@@ -206,7 +206,8 @@ def test_every_package_is_shipped() -> None:
 def written_files() -> list[Path]:
     """Return the text files of the project, without what tools leave behind."""
     folders = [*MAY_IMPORT, "api", "tests", "docs", "benchmarks", "examples", ".ci", ".github"]
-    found = [path for path in ROOT.iterdir() if path.is_file()]
+    # in a second work tree `.git` is a file that holds a path
+    found = [path for path in ROOT.iterdir() if path.is_file() and path.name != ".git"]
     found += [path for folder in folders for path in (ROOT / folder).rglob("*")]
     kinds = (".py", ".toml", ".md", ".yml", ".yaml", ".cfg", ".txt", ".sh", ".html", "")
     return [p for p in found if p.is_file() and p.suffix in kinds and "__pycache__" not in p.parts]

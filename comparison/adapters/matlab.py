@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import xarray as xr
-from scipy.io import savemat
 
 from ...online import load
 from ...online.records import written_whole
@@ -53,6 +52,8 @@ def export_mat(record: xr.Dataset, path: Path) -> list[str]:
     InputError
         If the file can't be written.
     """
+    from scipy.io import savemat
+
     arrays = {matlab_name(str(name)): record[name] for name in record.variables}
     content: dict[str, Any] = {name: _matlab_array(array.values) for name, array in arrays.items()}
     content |= {

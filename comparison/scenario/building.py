@@ -21,7 +21,9 @@ from ...symbolic import (
 from ...symbolic.arrays import Array, Vector3
 from ...symbolic.game import gamma_star, weight_matrix
 from ...symbolic.pyfile import called, find_attribute
+from ...symbolic.underwater import STATE_NAMES
 from ...symbolic.value import BasisFunction
+from .rules import require_one_each
 from .settings import EnvelopeSettings, GameSettings
 
 
@@ -54,6 +56,7 @@ def vehicle_setup(
     """Return the setup of a vehicle's game; raises InputError if a part breaks a rule."""
     model = Model(vehicle, current)
     assert envelope.half_widths is not None
+    require_one_each("envelope.half_widths", envelope.half_widths, vehicle.name, len(STATE_NAMES))
     half_widths = np.array(envelope.half_widths)
     problem = vehicle_problem(model, game, half_widths)
     _ = problem.P  # refuses a gamma without stabilising solution
@@ -92,11 +95,7 @@ def problem_setup(
 ) -> Setup:
     """Return the setup of a problem, with the level γ and the half-widths that the settings give."""
     if envelope.half_widths is not None:
-        if len(envelope.half_widths) != problem.n_states:
-            raise InputError(
-                f"envelope.half_widths has {len(envelope.half_widths)} numbers, but {problem.name} has "
-                f"{problem.n_states} states; give one for each"
-            )
+        require_one_each("envelope.half_widths", envelope.half_widths, problem.name, problem.n_states)
         problem = replace(problem, scale=np.array(envelope.half_widths))
     if game.gamma is not None:
         problem = problem.with_gamma(game.gamma)

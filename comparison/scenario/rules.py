@@ -54,6 +54,14 @@ def _vehicle_only(scenario: BaseModel) -> Iterator[str]:
         yield "simulation.mode=disturbed"
 
 
+def require_one_each(key: str, given: Sequence[float], name: str, n_states: int) -> None:
+    """Raise InputError unless a setting has one number for each state of `name`."""
+    if len(given) != n_states:
+        raise InputError(
+            f"{key} has {len(given)} numbers, but {name} has {n_states} states; give one for each"
+        )
+
+
 def require_start(
     simulation: SimulationSettings, state: Array, names: Sequence[str], half_widths: ArrayLike
 ) -> None:

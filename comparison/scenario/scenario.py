@@ -33,7 +33,7 @@ from .defaults import problem_defaults
 from .files import Files, read_settings
 from .laws import made_law
 from .overrides import override, replace_value
-from .rules import require_keys, require_level, require_start
+from .rules import require_keys, require_level, require_one_each, require_start
 from .settings import BasisSettings, EnvelopeSettings, GameSettings
 
 Restore = Callable[[str, Path | None, Files], "Scenario"]
@@ -272,12 +272,15 @@ class Scenario(Settings):
         if given is None:
             return
         if self.problem is None:
-            state = require_vehicle_state(given)
             widths = self.envelope.half_widths or ()
+            for key, numbers in (("simulation.initial_state", given), ("envelope.half_widths", widths)):
+                require_one_each(key, numbers, f"vehicle '{self.vehicle}'", len(STATE_NAMES))
+            state = require_vehicle_state(given)
             require_start(self.simulation, state, STATE_NAMES, widths)
             require_level(self.simulation, float(state[4]))
         else:
             problem = self._setup.problem
+            require_one_each("simulation.initial_state", given, problem.name, problem.n_states)
             state = problem.require_state(given)
             require_start(self.simulation, state, problem.state_names, problem.scale)
 

@@ -14,7 +14,6 @@ from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
-from scipy.stats import qmc
 
 from ...online import draw_samples
 from ...online.records import versions
@@ -38,6 +37,8 @@ def sampled(n_points: int, dimension: int, sampling: Sampling, seed: int) -> Arr
     rng = np.random.default_rng(seed)
     if sampling == "random":
         return rng.random((n_points, dimension))
+    from scipy.stats import qmc  # takes longer to load than all of ours
+
     if sampling == "latin":
         return np.asarray(qmc.LatinHypercube(dimension, seed=rng).random(n_points))
     exponent = math.ceil(math.log2(n_points)) if n_points > 1 else 0
