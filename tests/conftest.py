@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -26,8 +27,13 @@ JARGON = (
 
 @pytest.fixture(scope="session", autouse=True)
 def isolated_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """One compilation cache for the whole run, apart from the user's, and plots without a screen."""
-    folder = tmp_path_factory.mktemp("compiled")
+    """One compilation cache for the whole run, apart from the user's, and plots without a screen.
+
+    Tests that run in parallel share it: what one has compiled the others find.
+    """
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "compiled"
+    folder.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("STATIONKEEP_CACHE", str(folder))
         patch.setenv("MPLBACKEND", "Agg")
