@@ -89,8 +89,8 @@ INTERRUPTIONS = [
     (HeldPlant, "advance", 30),
     (HeldPlant, "rates", 50),
     (Learner, "step", 3),
-    (Monitor, "look", 1),
-    (Monitor, "look", 2),
+    (Monitor, "sample", 1),
+    (Monitor, "sample", 2),
     (Learner, "policies", 20),
 ]
 

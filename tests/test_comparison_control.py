@@ -124,7 +124,7 @@ def test_linearised_by_python_control_it_is_the_linear_game() -> None:
     closed = to_control(game, policy).linearize(np.zeros(12), np.zeros(6), eps=1e-7)
     found, expected = (
         np.sort_complex(closed.poles()),
-        np.sort_complex(np.linalg.eigvals(A - B @ policy.gain)),
+        np.sort_complex(np.linalg.eigvals(A - B @ problem.linear_gains[0])),
     )
     np.testing.assert_allclose(found, expected, atol=1e-4)
     assert found.real.max() < 0.0

@@ -92,7 +92,7 @@ def test_events_at_or_beyond_the_ends_leave_them() -> None:
     np.testing.assert_array_equal(aligned_mesh(mesh, np.array([1.0])), mesh)
 
 
-NAMED = ["direct", "certified", "saddle", "quick", "regret", "prediction"]
+NAMED = ["direct", "certified", "saddle", "quick", "fine", "prediction"]
 
 
 @pytest.mark.parametrize("name", NAMED)
@@ -248,7 +248,7 @@ def test_mesh_that_does_not_settle_ends_after_its_rounds() -> None:
 
 @pytest.mark.parametrize("name", NAMED)
 def test_the_documentation_says_what_the_named_settings_are(name: str) -> None:
-    text = (Path(__file__).parents[1] / "docs" / "offline.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "docs" / "theory" / "optimum.md").read_text(encoding="utf-8")
     (row,) = [line for line in text.splitlines() if line.startswith(f"| `{name}` |")]
     horizon, *others = [cell.strip() for cell in row.split("|")[2:6]]
     settings: MeshSettings = getattr(MeshSettings, name)

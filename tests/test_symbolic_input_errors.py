@@ -126,7 +126,7 @@ def test_states_that_are_allowed(model: Model) -> None:
     assert np.isfinite(model.drift([0, 0, 0, 9.0, np.radians(89.9), -9.0, 0, 0, 0, 0, 0, 0])).all()
     game = two_state_game()
     assert game.require_state([1, 2]).tolist() == [1.0, 2.0]
-    with pytest.raises(InputError, match=r"2 numbers \(x1,x2\), but its shape is \(3,\)"):
+    with pytest.raises(InputError, match=r"2 numbers \(x_1,x_2\), but its shape is \(3,\)"):
         game.require_state([1, 2, 3])
 
 
