@@ -64,7 +64,8 @@ def test_ctrl_c_during_online(user_folder: Path) -> None:
     if files_in(user_folder):
         record = load(user_folder / "out" / "learned.nc")
         assert str(record.attrs["stopped"]).startswith("interrupted at t = ")
-        assert 0.0 < record["time"].values[-1] < 2000.0
+        # it may have come before the first step was done
+        assert all(0.0 <= t < 2000.0 for t in record["time"].values)
         assert record["critic"].shape == (record.sizes["learn_time"], 78)
 
 
