@@ -280,7 +280,6 @@ class Scenario(Settings):
             require_level(self.simulation, float(state[4]))
         else:
             problem = self._setup.problem
-            require_one_each("simulation.initial_state", given, problem.name, problem.n_states)
             state = problem.require_state(given)
             require_start(self.simulation, state, problem.state_names, problem.scale)
 
