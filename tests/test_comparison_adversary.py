@@ -58,5 +58,5 @@ def test_watched_schedule_is_what_the_learner_drove_with() -> None:
     for t, u_control in used:
         weights = schedule.at(np.array([t + 1e-9]))[0]
         frozen = FrozenPolicy(station, weights)
-        frozen.step(ZETA[:6], ZETA[6:], 0.02)
+        frozen.step(ZETA, 0.02)
         np.testing.assert_array_equal(frozen.u_control, u_control)
