@@ -155,7 +155,7 @@ def limit_runs(scenario: Scenario, options: argparse.Namespace) -> tuple[str, li
     folder = options.rows.parent
     limits: dict[str, dict[str, Any]] = {"none": {}}
     for share in (1.0, 0.5, 0.25, 0.125, 0.0625):
-        plant = weaker(scenario.vehicle, share, folder)
+        plant = weaker(str(scenario.vehicle), share, folder)
         limits[f"{100.0 * share:g} %"] = {"thruster_limits": True, "plant": plant}
     runs = [
         Run(

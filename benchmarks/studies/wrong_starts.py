@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from stationkeep.comparison import Scenario
 from stationkeep.comparison.merit import Regret, regret
+from stationkeep.comparison.records import closed_loop
 from stationkeep.comparison.study.excitation import PLAIN, excitation_run
 from stationkeep.offline import QuickValue
 from stationkeep.offline.path import MeshSettings
-from stationkeep.online import draw_samples, run
+from stationkeep.online import draw_samples
 from stationkeep.symbolic import Basis, Problem, ValueFunctions, quadratic
 from stationkeep.symbolic.arrays import Array
 
@@ -144,7 +145,7 @@ def print_zero(scenario: Scenario, states: Array, keeper: Keeper) -> None:
 def rank_along(scenario: Scenario, case: Case) -> list[str]:
     """Return rank and margin of (18) at the fixed samples, under the actors of TIMES."""
     one, station = case.scenario(scenario), scenario.station_keeping()
-    history = run(one, case.make(one))
+    history = closed_loop(one, case.make(one))
     points = draw_samples(
         station.envelope, one.samples.number, one.samples.seed, inner=one.samples.inner
     )
