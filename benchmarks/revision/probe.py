@@ -19,7 +19,7 @@ from typing import Any
 FIXED = (
     *("learner.error=bellman", "learner.safeguard=false", "learner.normalizer=paper"),
     *("learner.leash=0", "learner.period=0.05"),
-    *("basis.name=quadratic", "samples.number=300", "samples.strategy=fixed"),
+    *("basis.name=quadratic", "samples.number=300"),
 )
 # settings, and how many calls a batch has
 STEPS: dict[str, tuple[tuple[str, ...], int]] = {
