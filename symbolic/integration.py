@@ -7,6 +7,7 @@ from typing import Literal, TypeVar
 
 import casadi
 import numpy as np
+import scipy.linalg
 from casadi import MX, SX
 from scipy.integrate import DOP853, solve_ivp
 
@@ -99,3 +100,24 @@ def integrate(
     if not answer.success or not np.all(np.isfinite(answer.y)):
         raise RunError(f"the integration failed between t = {span[0]:.2f} and {span[1]:.2f} s")
     return np.asarray(answer.y.T)
+
+
+def phi_functions(A: Array) -> tuple[Array, Array, Array, Array]:
+    """Return φ_0(A) to φ_3(A), each (n, n), from one exponential (Sidje 1998, sec. 2)."""
+    n = len(A)
+    chain = np.kron(np.diag(np.ones(3), 1), np.eye(n))
+    chain[:n, :n] = A
+    rows = scipy.linalg.expm(chain)[:n]
+    phi_0, phi_1, phi_2, phi_3 = np.hsplit(rows, 4)
+    return phi_0, phi_1, phi_2, phi_3
+
+
+def doubled_phi(phi: tuple[Array, Array, Array, Array]) -> tuple[Array, Array, Array, Array]:
+    """Return φ_0(2A) to φ_3(2A) from those of A: φ_k(2A) = (φ_0 φ_k + Σ_{j=1}^k φ_j / (k-j)!) / 2^k."""
+    phi_0, phi_1, phi_2, phi_3 = phi
+    return (
+        phi_0 @ phi_0,
+        (phi_0 @ phi_1 + phi_1) / 2.0,
+        (phi_0 @ phi_2 + phi_1 + phi_2) / 4.0,
+        (phi_0 @ phi_3 + phi_1 / 2.0 + phi_2 + phi_3) / 8.0,
+    )

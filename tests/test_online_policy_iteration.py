@@ -19,7 +19,7 @@ from stationkeep.online.learning.policy_iteration import (
 )
 from stationkeep.online.paper import BellmanTerms
 from stationkeep.online.rows import PathRows
-from stationkeep.symbolic import Basis, Problem, RunError, ValueFunctions, growing_steps, quadratic
+from stationkeep.symbolic import Basis, Problem, RunError, ValueFunctions, quadratic
 
 from .games import HALF_WIDTHS, Array, linear_quadratic, plain, two_state
 
@@ -65,7 +65,7 @@ def linear_two_state() -> tuple[Problem, Basis, ValueFunctions]:
 
 
 def two_state_paths(functions: ValueFunctions, n_steps: int = 800, points: int = 40) -> PathRows:
-    return PathRows(functions.prediction(n_steps), growing_steps(20.0, n_steps), points)
+    return PathRows(functions.prediction(20.0, n_steps), points)
 
 
 def test_costate_rows_are_kleinmans_iteration() -> None:
@@ -158,16 +158,15 @@ def test_rows_relative_to_the_whole_are_the_gradient_of_the_cost(zeta: tuple[flo
     start = np.array(zeta)
     errors = []
     for n_steps in (200, 400):
-        steps = growing_steps(20.0, n_steps)
-        prediction = functions.prediction(n_steps)
+        prediction = functions.prediction(20.0, n_steps)
 
         def log_cost(W: Array) -> float:
-            return float(np.log(prediction.path(start, W, W, steps).cost))  # noqa: B023
+            return float(np.log(prediction.path(start, W, W).cost))  # noqa: B023
 
         expected = np.array(
             [(log_cost(START + d) - log_cost(START - d)) / 2e-5 for d in 1e-5 * np.eye(3)]
         )
-        paths = PathRows(prediction, steps, n_steps, "whole")
+        paths = PathRows(prediction, n_steps, "whole")
         omega, target, weights = paths.at(start[None, :], START, START)
         # one row a point for the single input; those of the value follow
         omega, target, weights = omega[:n_steps], target[:n_steps], weights[:n_steps]

@@ -19,7 +19,7 @@ STEPS = growing_steps(20.0, 400)
 
 
 def prediction(functions: ValueFunctions) -> Prediction:
-    return functions.prediction(len(STEPS))
+    return functions.prediction(20.0, len(STEPS))
 
 
 def test_steps_add_up_and_grow() -> None:
@@ -31,7 +31,7 @@ def test_steps_add_up_and_grow() -> None:
 def test_optimal_policies_cost_the_value_and_the_costate_is_its_gradient() -> None:
     """V* = ζ_1^2 / 2 + ζ_2^2, so J = 2.75 and λ = (ζ_1, 2 ζ_2) all along the path."""
     weights = TWO_STATE_WEIGHTS
-    path = prediction(two_state()[2]).costates(START, weights, weights, STEPS)
+    path = prediction(two_state()[2]).costates(START, weights, weights)
     assert path.cost == pytest.approx(2.75, rel=1e-6)
     V = path.states[:, 0] ** 2 / 2 + path.states[:, 1] ** 2
     np.testing.assert_allclose(path.cost_to_go, V, atol=1e-6)
@@ -46,7 +46,7 @@ def test_path_agrees_with_another_integration(actors: tuple[tuple[float, ...], .
     problem, _, functions = two_state()
     actor_1, actor_2 = (np.array(actor) for actor in actors)
     assert functions.at(START[None, :]).f.shape == (1, 2)
-    path = prediction(functions).path(START, actor_1, actor_2, STEPS)
+    path = prediction(functions).path(START, actor_1, actor_2)
     states, cost = integrated(lambda zeta: functions.policies(zeta, actor_1, actor_2), path.times)
     np.testing.assert_allclose(path.states, states, atol=1e-5)
     rest = states[-1] @ problem.P @ states[-1]
@@ -74,7 +74,7 @@ def test_linear_path_agrees_with_another_integration() -> None:
     A, B = problem.linearization
     P = solve_continuous_are(A, B, problem.game.Q, problem.game.R_eff)
     push = B.T @ P
-    path = prediction(functions).linear_path(START, STEPS)
+    path = prediction(functions).linear_path(START)
     states, cost = integrated(lambda zeta: (-push @ zeta, push @ zeta / 4.0), path.times)
     np.testing.assert_allclose(path.states, states, atol=1e-5)
     assert path.cost == pytest.approx(cost + states[-1] @ P @ states[-1], rel=1e-6)
@@ -83,8 +83,7 @@ def test_linear_path_agrees_with_another_integration() -> None:
 def test_linear_path_of_a_linear_quadratic_game_costs_its_value() -> None:
     problem, _, functions = linear_quadratic()
     zeta = 0.3 * problem.scale
-    steps = growing_steps(30.0, 300)
-    path = functions.prediction(len(steps)).linear_path(zeta, steps)
+    path = functions.prediction(30.0, 300).linear_path(zeta)
     assert path.cost == pytest.approx(zeta @ problem.P @ zeta, rel=1e-6)
 
 
@@ -93,11 +92,11 @@ def test_costate_is_the_gradient_of_the_predicted_cost() -> None:
     functions = two_state()[2]
     actor_1, actor_2 = np.array([0.8, 0.2, 1.4]), np.array([0.3, 0.0, 0.7])
     predict = prediction(functions)
-    path = predict.costates(START, actor_1, actor_2, STEPS)
+    path = predict.costates(START, actor_1, actor_2)
     assert path.costates is not None
     for i, step in enumerate(1e-5 * np.eye(2)):
         higher, lower = (
-            predict.path(START + side * step, actor_1, actor_2, STEPS).cost for side in (1, -1)
+            predict.path(START + side * step, actor_1, actor_2).cost for side in (1, -1)
         )
         assert path.costates[0, i] == pytest.approx((higher - lower) / 2e-5, rel=1e-7)
 
@@ -106,7 +105,7 @@ def test_linear_quadratic_costate_is_twice_P_zeta() -> None:
     problem, basis, functions = linear_quadratic()
     exact = basis.quadratic_weights(problem.P)
     start = 0.3 * problem.scale
-    path = prediction(functions).costates(start, exact, exact, STEPS)
+    path = prediction(functions).costates(start, exact, exact)
     assert path.cost == pytest.approx(start @ problem.P @ start, rel=1e-5)
     assert path.costates is not None
     expected = 2.0 * path.states @ problem.P
@@ -115,7 +114,7 @@ def test_linear_quadratic_costate_is_twice_P_zeta() -> None:
 
 def test_a_path_that_leaves_costs_infinitely_much() -> None:
     functions = two_state()[2]
-    path = prediction(functions).costates(START, *2 * [-3.0 * TWO_STATE_WEIGHTS], STEPS)
+    path = prediction(functions).costates(START, *2 * [-3.0 * TWO_STATE_WEIGHTS])
     assert path.cost == np.inf
     assert np.all(np.isfinite(path.states))
     assert np.abs(path.states).max() <= 4.0 * 2.0  # half-widths of 2

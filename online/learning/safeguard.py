@@ -5,7 +5,8 @@ J(ζ; Ŵ_a1, Ŵ_a2) is the predicted cost of the game from the present state whe
 u_1 = -R^-1 g(ζ)'P ζ) if J there is lower; then they go all, half, a quarter or a tenth of the way that
 (20)(21) ask for, the first that lowers J, or stay. Until the next step the policy in use is the
 actors', or, where that is predicted to cost less, the linear H-infinity policy u_1 = -K_1 ζ with the
-constant gain K_1 = R^-1 g(0)'P. The actors learn on all the same.
+constant gain K_1 = R^-1 g(0)'P. The actors learn on all the same. Where the model loses the vehicle
+under them, that is where their J is infinite, the linear policy is in use too.
 
 Along the model's own trajectory the cost already paid plus the J of the policy in use never rises: no
 step raises the lesser J, and between steps the J of the one that is followed falls by exactly what is
@@ -138,4 +139,5 @@ class Safeguard:
         return Accepted(start.actors, 0.0, start.cost, self._linear(zeta, start.cost))
 
     def _linear(self, zeta: Array, cost: float) -> bool:
-        return self.may_use_linear and self.costs.linear_cost(zeta) < cost
+        """Return whether the linear policy is predicted to cost less, or nothing is predicted at all."""
+        return self.may_use_linear and (cost == np.inf or self.costs.linear_cost(zeta) < cost)

@@ -41,17 +41,15 @@ class PathRows:
 
     Parameters
     ----------
-    prediction, steps : of the paths
+    prediction : of the paths
     points : of each path that give rows
     relative_to : what the weights are relative to
     """
 
-    def __init__(
-        self, prediction: Prediction, steps: Array, points: int, relative_to: RelativeTo = "rest"
-    ) -> None:
+    def __init__(self, prediction: Prediction, points: int, relative_to: RelativeTo = "rest") -> None:
         self._prediction = prediction
-        self._steps = steps
         self._relative_to = relative_to
+        steps = prediction.steps
         edges = np.unique(np.linspace(0, len(steps), points + 1).astype(int))
         self._nodes = edges[:-1]
         gaps = np.diff(np.append(0.0, np.cumsum(steps))[edges])
@@ -62,7 +60,7 @@ class PathRows:
 
         Paths that leave, or that cost nothing since the start is the origin, give no rows.
         """
-        found = [self._prediction.costates(z, actor_1, actor_2, self._steps) for z in starts]
+        found = [self._prediction.costates(z, actor_1, actor_2) for z in starts]
         usable = [path for path in found if 0.0 < path.cost < np.inf]
         return self._stacked(usable) if usable else self.none()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...symbolic import ValueFunctions, growing_steps
+from ...symbolic import ValueFunctions
 from ...symbolic.arrays import Array
 from .paths import PathRows, RelativeTo
 
@@ -18,17 +18,16 @@ class Predictor:
     """
 
     def __init__(self, functions: ValueFunctions, horizon: float, n_steps: int) -> None:
-        self._prediction = functions.prediction(n_steps)
-        self._steps = growing_steps(horizon, n_steps)
+        self._prediction = functions.prediction(horizon, n_steps)
 
     def cost(self, zeta: Array, actor_1: Array, actor_2: Array) -> float:
         """Return J from ζ (n,) of the policies (14)(15), infinite if they lose the vehicle."""
-        return self._prediction.path(zeta, actor_1, actor_2, self._steps).cost
+        return self._prediction.path(zeta, actor_1, actor_2).cost
 
     def linear_cost(self, zeta: Array) -> float:
         """Return J from ζ (n,) of the linear H-infinity policy, likewise."""
-        return self._prediction.linear_path(zeta, self._steps).cost
+        return self._prediction.linear_path(zeta).cost
 
     def path_rows(self, points: int, relative_to: RelativeTo = "rest") -> PathRows:
         """Return the rows of the costate error along its paths, at so many points of each."""
-        return PathRows(self._prediction, self._steps, points, relative_to)
+        return PathRows(self._prediction, points, relative_to)

@@ -2,8 +2,9 @@
 
 from .basis import Basis, BasisFunction, drag, drag_cubic, find_function, quadratic
 from .functions import PointTerms, ValueFunctions
-from .prediction import BOUND, PredictedPath, Prediction, growing_steps
+from .prediction import BOUND, PredictedPath, Prediction
 from .setup import Setup
+from .stepping import growing_steps
 
 __all__ = [
     "BOUND",

@@ -15,6 +15,7 @@ from ..game import Problem
 from .basis import Basis
 from .prediction import Prediction
 from .sparse_terms import TermLayout, sparse_terms
+from .stepping import stepping_of
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class ValueFunctions:
         self.compiled = compiled
         self._exports: dict[str, Export] = {}
         self._samplers: dict[int, Kernel] = {}
-        self._predictions: dict[int, Prediction] = {}
+        self._predictions: dict[tuple[float, int], Prediction] = {}
 
     @cached_property
     def sigma(self) -> Kernel:
@@ -117,13 +118,14 @@ class ValueFunctions:
     def _sparse_terms(self) -> tuple[casadi.Function, TermLayout]:
         return sparse_terms(self.problem, self.basis)
 
-    def prediction(self, n_steps: int) -> Prediction:
-        """Return the predicted closed loop of N steps and its costates."""
-        if n_steps not in self._predictions:
-            self._predictions[n_steps] = Prediction(
-                self.problem, self.basis, n_steps, self._export_mapped
+    def prediction(self, horizon: float, n_steps: int) -> Prediction:
+        """Return the predicted closed loop of N steps over a horizon [s], and its costates."""
+        if (horizon, n_steps) not in self._predictions:
+            stepping = stepping_of(self.problem, horizon, n_steps)
+            self._predictions[horizon, n_steps] = Prediction(
+                self.problem, self.basis, stepping, self._export_mapped
             )
-        return self._predictions[n_steps]
+        return self._predictions[horizon, n_steps]
 
     def exports(self, n_samples: int) -> Iterator[Export]:
         """Build every function and yield what became of it."""

@@ -1,8 +1,8 @@
 """Predicted closed-loop trajectories, their cost and its gradient, as compiled functions.
 
 Under the policies (14)(15) of given actor weights the model obeys ζ_dot = F(ζ), with the local cost
-r(ζ) = r(ζ, û_1, û_2). One call integrates both over the whole horizon by the classical Runge-Kutta
-method with fixed steps, and one more yields the costates
+r(ζ) = r(ζ, û_1, û_2). One call integrates both over the whole horizon with fixed steps, by a method
+that suits the fastest mode (`stepping`), and one more yields the costates
 
     λ(t) = ∂J(ζ(t)) / ∂ζ,   J(ζ(t)) = ∫_t^T r dτ + ζ(T)'P ζ(T),
     -λ_dot = r_ζ' + F_ζ'λ,   λ(T) = 2 P ζ(T)
@@ -24,8 +24,8 @@ from casadi import DM, MX, SX
 from ..arrays import Array
 from ..compiled import Kernel, dense_function
 from ..game import Problem
-from ..integration import runge_kutta_step
 from .basis import Basis
+from .stepping import Stepping
 
 BOUND = 4.0  # half-widths; a path that gets farther, or out of the domain, counts as lost
 Exporter = Callable[[casadi.Function, int], Kernel]
@@ -54,17 +54,8 @@ class PredictedPath:
         return float(self.cost_to_go[0])
 
 
-def growing_steps(horizon: float, n_steps: int, growth: float = 5.0) -> Array:
-    """Return N steps that add up to the horizon, the last `growth` times the first, shape (N,) [s].
-
-    The fast modes are damped within a second or two; what is left is slow.
-    """
-    steps = np.linspace(1.0, growth, n_steps)
-    return np.asarray(horizon / steps.sum() * steps)
-
-
 class Prediction:
-    """Predict N steps under given actor weights.
+    """Predict a horizon under given actor weights.
 
     A policy that is too stiff for the steps makes the path leave the bound: such a policy counts as
     bad, never as good.
@@ -72,31 +63,36 @@ class Prediction:
     Parameters
     ----------
     problem, basis : of the policies
-    n_steps : N
+    stepping : the steps over the horizon, and their method
     exporter : makes a kernel of a function and its number of operations
     """
 
-    def __init__(self, problem: Problem, basis: Basis, n_steps: int, exporter: Exporter) -> None:
+    def __init__(self, problem: Problem, basis: Basis, stepping: Stepping, exporter: Exporter) -> None:
         self.problem = problem
         self.basis = basis
-        self.n_steps = n_steps
+        self.stepping = stepping
         self._exporter = exporter
         self._row_kernels: dict[int, Kernel] = {}
 
-    def path(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> PredictedPath:
-        """Return the path from ζ (n,) under Ŵ_a1, Ŵ_a2 (m,) over `steps` (N,) [s]."""
-        (nodes,) = self._path_kernel(zeta, actor_1, actor_2, steps)
-        return self._as_path(nodes, steps)
+    @property
+    def steps(self) -> Array:
+        """The steps over the horizon, (N,) [s]."""
+        return self.stepping.steps
 
-    def linear_path(self, zeta: Array, steps: Array) -> PredictedPath:
+    def path(self, zeta: Array, actor_1: Array, actor_2: Array) -> PredictedPath:
+        """Return the path from ζ (n,) under Ŵ_a1, Ŵ_a2 (m,)."""
+        (nodes,) = _called(self._path_kernel, zeta, actor_1, actor_2)
+        return self._as_path(nodes)
+
+    def linear_path(self, zeta: Array) -> PredictedPath:
         """Return the path from ζ (n,) under the linear policies u_1 = -K_1 ζ and u_2 = K_2 ζ."""
-        (nodes,) = self._linear_kernel(zeta, steps)
-        return self._as_path(nodes, steps)
+        (nodes,) = _called(self._linear_kernel, zeta)
+        return self._as_path(nodes)
 
-    def costates(self, zeta: Array, actor_1: Array, actor_2: Array, steps: Array) -> PredictedPath:
+    def costates(self, zeta: Array, actor_1: Array, actor_2: Array) -> PredictedPath:
         """Return the same path with its costates."""
-        nodes, costates = self._costate_kernel(zeta, actor_1, actor_2, steps)
-        return self._as_path(nodes, steps, costates.T)
+        nodes, costates = _called(self._costate_kernel, zeta, actor_1, actor_2)
+        return self._as_path(nodes, costates.T)
 
     def rows(self, points: Array, costates: Array) -> tuple[Array, Array, Array]:
         """Return L g'σ'^T (N, k, m), L g'λ (N, k) and σ (N, m) at N points, L'L = R_eff^-1 / 4.
@@ -115,30 +111,35 @@ class Prediction:
         by_point = regressors.reshape(n_points, m, k).transpose(0, 2, 1)
         return by_point, targets.reshape(n_points, k), sigma.reshape(n_points, m)
 
-    def _as_path(self, nodes: Array, steps: Array, costates: Array | None = None) -> PredictedPath:
-        n = self.problem.n_states
+    def _as_path(self, nodes: Array, costates: Array | None = None) -> PredictedPath:
+        n, P, steps = self.problem.n_states, self.problem.P, self.steps
         states, cost, clock = nodes[:n].T, nodes[n], nodes[n + 1]
         stayed = clock[-1] >= (1.0 - 1e-6) * steps.sum()
-        rest = float(states[-1] @ self.problem.P @ states[-1])
-        to_go = cost[-1] + rest - cost if stayed else np.full(len(cost), np.inf)
+        if not stayed:
+            to_go = np.full(len(cost), np.inf)
+        elif self.stepping.relative:
+            to_go = cost[-1] - cost + np.einsum("ti,ij,tj->t", states, P, states)
+        else:
+            to_go = cost[-1] + float(states[-1] @ P @ states[-1]) - cost
         return PredictedPath(np.append(0.0, np.cumsum(steps)), states, to_go, costates)
 
     @cached_property
     def _step(self) -> casadi.Function:
-        """One Runge-Kutta step of (ζ, cost, clock) under the policies of given weights."""
+        """One step of (ζ, cost, clock) under the policies of given weights."""
         return self._step_of(self._rates)
 
     def _step_of(self, rates: casadi.Function) -> casadi.Function:
-        """Return a step of rates with parameters; outside the bound nothing moves any more."""
+        """Return a step of rates with weights; outside the bound nothing moves any more."""
         n = self.problem.n_states
-        y, dt = MX.sym("y", n + 2), MX.sym("dt")
-        parameters = [MX.sym(rates.name_in(i), *rates.size_in(i)) for i in range(1, rates.n_in())]
-        moved = runge_kutta_step(lambda at: rates(at, *parameters), y, dt)
+        y = MX.sym("y", n + 2)
+        weights = [MX.sym(rates.name_in(i), *rates.size_in(i)) for i in range(1, rates.n_in())]
+        own = self._parameters(1)
+        moved = self.stepping.step(lambda at: rates(at, *weights), y, own)
         inside = casadi.mmax(casadi.fabs(moved[:n] / DM(self.problem.scale))) < BOUND
         if self.problem.domain:
             margins = casadi.Function("margins", [self.problem.zeta], [self.problem.margins])
             inside = casadi.logic_and(inside, casadi.mmin(margins(moved[:n])) > 0)
-        return casadi.Function("step", [y, *parameters, dt], [casadi.if_else(inside, moved, y)])
+        return casadi.Function("step", [y, *weights, *own], [casadi.if_else(inside, moved, y)])
 
     @cached_property
     def _rates(self) -> casadi.Function:
@@ -164,54 +165,81 @@ class Prediction:
         names = ["y", *(f"parameter_{i}" for i in range(len(parameters)))]
         return casadi.Function("rates", [y, *parameters], [at_y], names, ["rates"], {"cse": True})
 
-    def _symbols(self) -> tuple[MX, list[MX]]:
+    def _parameters(self, n_steps: int) -> list[MX]:
+        """Return symbols of the parameters of so many steps."""
+        known = self.stepping.parameters.items()
+        columns = [(name, *value.shape) for name, value in known]
+        return [
+            MX.sym(name, rows, of_all // len(self.steps) * n_steps) for name, rows, of_all in columns
+        ]
+
+    def _symbols(self) -> tuple[MX, list[MX], list[MX]]:
         n, m = self.problem.n_states, self.basis.n_basis
         inputs = [MX.sym("zeta", n), MX.sym("actor_1", m), MX.sym("actor_2", m)]
-        steps = MX.sym("steps", self.n_steps)
-        return self._nodes(self._step, inputs, steps), [*inputs, steps]
+        parameters = self._parameters(len(self.steps))
+        return self._nodes(self._step, inputs, parameters), inputs, parameters
 
-    def _nodes(self, step: casadi.Function, inputs: list[MX], steps: MX) -> MX:
-        start = casadi.vertcat(inputs[0], MX.zeros(2))
-        repeated = [casadi.repmat(parameter, 1, self.n_steps) for parameter in inputs[1:]]
-        return casadi.horzcat(start, step.mapaccum(self.n_steps)(start, *repeated, steps.T))
+    def _nodes(self, step: casadi.Function, inputs: list[MX], parameters: list[MX]) -> MX:
+        start, n_steps = casadi.vertcat(inputs[0], MX.zeros(2)), len(self.steps)
+        repeated = [casadi.repmat(weights, 1, n_steps) for weights in inputs[1:]]
+        return casadi.horzcat(start, step.mapaccum(n_steps)(start, *repeated, *parameters))
+
+    def _exported(
+        self, name: str, inputs: list[MX], parameters: list[MX], outputs: dict[str, MX], operations: int
+    ) -> Kernel:
+        """Return a kernel whose last inputs are the parameters, already written."""
+        symbols = [*inputs, *parameters]
+        names = [symbol.name() for symbol in symbols]
+        function = casadi.Function(name, symbols, [*outputs.values()], names, [*outputs])
+        kernel = self._exporter(function, operations)
+        values = self.stepping.parameters.values()
+        for array, value in zip(kernel.inputs[len(inputs) :], values, strict=True):
+            array[...] = value
+        return kernel
 
     @cached_property
     def _path_kernel(self) -> Kernel:
-        nodes, inputs = self._symbols()
-        names = [symbol.name() for symbol in inputs]
-        function = casadi.Function("predicted_path", inputs, [nodes], names, ["nodes"])
-        return self._exporter(function, self._operations(self._rates))
+        nodes, inputs, parameters = self._symbols()
+        operations = self._operations(self._rates)
+        return self._exported("predicted_path", inputs, parameters, {"nodes": nodes}, operations)
 
     @cached_property
     def _linear_kernel(self) -> Kernel:
-        zeta, steps = MX.sym("zeta", self.problem.n_states), MX.sym("steps", self.n_steps)
+        zeta, parameters = MX.sym("zeta", self.problem.n_states), self._parameters(len(self.steps))
         K_1, K_2 = self.problem.linear_gains
         rates = self._rates_under(-DM(K_1) @ self.problem.zeta, DM(K_2) @ self.problem.zeta, [])
-        nodes = self._nodes(self._step_of(rates), [zeta], steps)
-        names = ["zeta", "steps"]
-        function = casadi.Function("predicted_linear_path", [zeta, steps], [nodes], names, ["nodes"])
-        return self._exporter(function, self._operations(rates))
+        outputs = {"nodes": self._nodes(self._step_of(rates), [zeta], parameters)}
+        operations = self._operations(rates)
+        return self._exported("predicted_linear_path", [zeta], parameters, outputs, operations)
 
     @cached_property
     def _costate_kernel(self) -> Kernel:
-        n = self.problem.n_states
-        nodes, inputs = self._symbols()
-        y, dt = MX.sym("y", n + 2), MX.sym("dt")
+        n, n_steps = self.problem.n_states, len(self.steps)
+        nodes, inputs, parameters = self._symbols()
+        y, later = MX.sym("y", n + 2), MX.sym("costate", n + 2)
         weights = [MX.sym("actor_1", self.basis.n_basis), MX.sym("actor_2", self.basis.n_basis)]
-        later = MX.sym("costate", n + 2)
-        earlier = casadi.jtimes(self._step(y, *weights, dt), y, later, True)
-        back = casadi.Function("back", [later, y, *weights, dt], [earlier])
-        last = casadi.vertcat(2 * DM(self.problem.P) @ nodes[:n, -1], 1, 0)
-        repeated = [casadi.repmat(symbol, 1, self.n_steps) for symbol in inputs[1:3]]
-        swept = back.mapaccum(self.n_steps)(last, nodes[:, -2::-1], *repeated, inputs[3][::-1].T)
+        own = self._parameters(1)
+        earlier = casadi.jtimes(self._step(y, *weights, *own), y, later, True)
+        back = casadi.Function("back", [later, y, *weights, *own], [earlier])
+        gradient = 2 * DM(self.problem.P) @ nodes[:n, :]
+        at_end = MX.zeros(n) if self.stepping.relative else gradient[:, -1]
+        last = casadi.vertcat(at_end, 1, 0)
+        repeated = [casadi.repmat(symbol, 1, n_steps) for symbol in inputs[1:]]
+        reverse = [
+            casadi.horzcat(*casadi.horzsplit(each, each.shape[1] // n_steps)[::-1])
+            for each in parameters
+        ]
+        swept = back.mapaccum(n_steps)(last, nodes[:, -2::-1], *repeated, *reverse)
         costates = casadi.horzcat(swept[:, ::-1], last)[:n, :]
-        names = [symbol.name() for symbol in inputs]
-        outputs = ["nodes", "costates"]
-        function = casadi.Function("predicted_costates", inputs, [nodes, costates], names, outputs)
-        return self._exporter(function, 4 * self._operations(self._rates))
+        outputs = {
+            "nodes": nodes,
+            "costates": costates + gradient if self.stepping.relative else costates,
+        }
+        operations = 4 * self._operations(self._rates)
+        return self._exported("predicted_costates", inputs, parameters, outputs, operations)
 
     def _operations(self, rates: casadi.Function) -> int:
-        return int(4 * self.n_steps * rates.n_instructions())
+        return int(4 * len(self.steps) * rates.n_instructions())
 
     def _rows_of(self, n_points: int) -> Kernel:
         problem, n = self.problem, self.problem.n_states
@@ -231,3 +259,11 @@ class Prediction:
         names = ["points", "costates"], ["regressors", "targets", "sigmas"]
         function = casadi.Function("costate_rows", [points, costates], [*mapped], *names)
         return self._exporter(function, point.n_instructions() * n_points)
+
+
+def _called(kernel: Kernel, *arguments: Array) -> tuple[Array, ...]:
+    """Return copies of the results for the first arguments; the others are those of before."""
+    for array, value in zip(kernel.inputs, arguments, strict=False):
+        array[...] = value
+    kernel.evaluate()
+    return tuple([output.copy("K") for output in kernel.outputs])
