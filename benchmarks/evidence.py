@@ -14,6 +14,7 @@ import numpy as np
 from casadi import SX
 from stationkeep.comparison import Scenario
 from stationkeep.online import Learner, LearnerSettings, draw_samples
+from stationkeep.online.learning import PERIOD
 from stationkeep.online.paper import BellmanTerms, bellman_error
 from stationkeep.symbolic import (
     Basis,
@@ -62,7 +63,7 @@ def two_state() -> None:
         settings = LearnerSettings.as_printed(rule=rule, forgetting=2.0)
         learner = Learner(problem, basis, settings, samples, ideal, start)
         for _ in range(400):
-            learner.step(np.array([0.5, 0.5]), settings.period)
+            learner.step(np.array([0.5, 0.5]), PERIOD)
         print(f"two-state game, {rule}: |W - W*| = {np.abs(learner.critic - ideal).max():.1e}")
     points = RNG.uniform(-2.0, 2.0, (200, 2))
     terms = BellmanTerms.at(points, ValueFunctions(problem, basis).at(points), problem.game)
@@ -93,14 +94,14 @@ def linear_quadratic() -> None:
     )
     learner = Learner(problem, basis, settings, points, exact)
     for _ in range(200):
-        learner.step(0.1 * station.half_widths, settings.period)
+        learner.step(0.1 * station.half_widths, PERIOD)
     error = np.linalg.norm(learner.critic - exact) / np.linalg.norm(exact)
     print(f"LQ game, least squares from P/2: |W - W*| / |W*| = {error:.1e}")
     single = Learner(problem.with_game(problem.game.single_player()), basis, settings, points, exact)
     double = Learner(problem, basis, settings, points, exact)
     for _ in range(50):
         for one in (single, double):
-            one.step(0.1 * station.half_widths, settings.period)
+            one.step(0.1 * station.half_widths, PERIOD)
     gap = np.linalg.norm(single.critic - double.critic) / np.linalg.norm(exact)
     equal = np.array_equal(double.actor_1, double.actor_2)
     print(f"equal actors stay equal: {equal}; single-player learner with R_eff: {gap:.1e} apart")

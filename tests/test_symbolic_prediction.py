@@ -95,9 +95,7 @@ def test_costate_is_the_gradient_of_the_predicted_cost() -> None:
     path = predict.costates(START, actor_1, actor_2)
     assert path.costates is not None
     for i, step in enumerate(1e-5 * np.eye(2)):
-        higher, lower = (
-            predict.path(START + side * step, actor_1, actor_2).cost for side in (1, -1)
-        )
+        higher, lower = (predict.path(START + side * step, actor_1, actor_2).cost for side in (1, -1))
         assert path.costates[0, i] == pytest.approx((higher - lower) / 2e-5, rel=1e-7)
 
 

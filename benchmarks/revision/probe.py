@@ -69,7 +69,7 @@ def step() -> dict[str, float]:
     for name, (overrides, calls) in STEPS.items():
         scenario = scenario_class.load(overrides=list(overrides))
         controller = controller_class(scenario)
-        zeta, period = scenario.initial_state, scenario.learner.period
+        zeta, period = scenario.initial_state, scenario.learner.period or 0.25
 
         def call(controller: Any = controller, zeta: Any = zeta, period: float = period) -> object:
             return controller.step(zeta[:6], zeta[6:], period)

@@ -34,6 +34,7 @@ def run(options: argparse.Namespace) -> int:
         "final_state": record["zeta"].values[-1],
         "real_time_factor": float(record["time"][-1]) / float(record.attrs["wall_seconds"]),
         "stopped": stopped,
+        "unlearned": metrics.unlearned,
         "record": path,
     }
     if scenario.simulation.mode == "disturbed":
@@ -46,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         print_json(answer)
     else:
         _print(answer, scenario.simulation.mode)
-    return 0 if stopped is None else 1
+    return 0 if stopped is None and metrics.unlearned is None else 1
 
 
 def _margin(record: xr.Dataset, station: Setup) -> float | None:
@@ -91,6 +92,7 @@ def _print(answer: dict[str, Any], mode: str) -> None:
         ["simulated time over wall time", _form(answer["real_time_factor"], ".1f")],
         ["final state", final],
         ["ended early", answer["stopped"] or "no"],
+        ["learned", answer["unlearned"] or "yes"],
         ["record", str(answer["record"])],
     ]
     if "dissipation_margin" in answer:

@@ -1,6 +1,7 @@
 """What a run cost, how much more than the optimum, and how that is distributed over many runs."""
 
 from .cost import cost_to_date, cost_to_go, dissipation_margin, game_cost
+from .learning import learning_fault
 from .metrics import RunMetrics, run_metrics
 from .regrets import QUANTILES, Regret, finite, regret
 
@@ -13,6 +14,7 @@ __all__ = [
     "dissipation_margin",
     "finite",
     "game_cost",
+    "learning_fault",
     "regret",
     "run_metrics",
 ]

@@ -10,6 +10,7 @@ import xarray as xr
 from ...symbolic import Setup, StationKeeping, Vehicle
 from ...symbolic.arrays import Array
 from .cost import cost_to_date, cost_to_go
+from .learning import learning_fault
 from .regrets import regret
 
 
@@ -38,6 +39,7 @@ class RunMetrics:
     rest_share : part of the cost that is the estimate ζ(T)'P ζ(T)
     peak_thrust : largest share of a thruster's limit that the least-norm allocation asks for [-]
     stopped : why the run ended early, or None
+    unlearned : why its learner learned nothing although it was due, or None
     """
 
     cost: float | None
@@ -53,6 +55,7 @@ class RunMetrics:
     rest_share: float | None
     peak_thrust: float | None
     stopped: str | None
+    unlearned: str | None = None
 
 
 def run_metrics(record: xr.Dataset, setup: Setup, optimum: float | None) -> RunMetrics:
@@ -90,6 +93,7 @@ def run_metrics(record: xr.Dataset, setup: Setup, optimum: float | None) -> RunM
         rest_share=rest_share,
         peak_thrust=None if vehicle is None else peak_thrust(record["tau_b"].values, vehicle),
         stopped=stopped,
+        unlearned=learning_fault(record),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...online import Policy
-from ...online.loop import Feedback
+from ...online.loop import Feedback, MeanState
 from ...symbolic import Game, Problem, StationKeeping
 from ...symbolic.arrays import Array
 
@@ -23,10 +23,11 @@ class LinearPolicy(Feedback):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.gain = self._gain()
+        self._mean_state = MeanState(problem)
 
     def control(self, zeta: Array, dt: float) -> Array:
-        """Return -K ζ."""
-        return -self.gain @ zeta
+        """Return -K ζ, where the loop is fast at the mean state of the period."""
+        return -self.gain @ self._mean_state(zeta, dt)
 
     def _gain(self) -> Array:
         return self.problem.linear_gains[0]

@@ -9,7 +9,7 @@ import numpy as np
 from ...offline import MeshSettings, Trajectory
 from ...offline.direct import StructuredNewton
 from ...offline.path import Grid, graded_mesh
-from ...online.loop import Feedback
+from ...online.loop import Feedback, MeanState
 from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
 
@@ -68,6 +68,7 @@ class ModelPredictive(Feedback):
         mesh = graded_mesh(s.horizon, s.intervals, s.grading)
         self._grid = Grid(mesh, s.degree, problem.n_inputs)
         self._linear = problem.linear_gain
+        self._mean_state = MeanState(problem)
         self._plan: Trajectory | None = None
         self._age = np.inf  # of the plan [s]
         self._since = np.inf  # the last solve was tried [s]
@@ -75,6 +76,7 @@ class ModelPredictive(Feedback):
 
     def control(self, zeta: Array, dt: float) -> Array:
         """Return R^-1 R_eff v of the plan, made anew once the period has passed."""
+        zeta = self._mean_state(zeta, dt)
         if self._since >= self.settings.period * (1.0 - 1e-9):
             self._solve(zeta)
             self._since = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from ...online import History, LearnedPolicy, Policy, VehiclePolicy, run
-from ...online.loop import ProblemSystem, Progress, drive
+from ...online.loop import ProblemSystem, Progress, drive, require_held
 from ..policies import AnyPolicy
 from ..scenario import Scenario
 
@@ -13,7 +13,14 @@ from ..scenario import Scenario
 def closed_loop(
     scenario: Scenario, policy: AnyPolicy | None = None, progress: Progress | None = None
 ) -> History:
-    """Run a scenario of a vehicle or of a problem, with its own learner unless a policy is given."""
+    """Run a scenario of a vehicle or of a problem, with its own learner unless a policy is given.
+
+    Raises
+    ------
+    InputError
+        If the control period can't hold the game.
+    """
+    require_held(scenario.setup().problem, scenario.simulation.control_period)
     if scenario.problem is None:
         return run(scenario, cast("VehiclePolicy | None", policy), progress)
     setup = scenario.setup()

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...online import LearnerSettings, SimulationSettings
+from ...online.learning import PERIOD
 from ...symbolic import Problem
 
 DECAY = 0.117  # 1/s, of the slowest mode of the shipped game
@@ -27,7 +28,7 @@ def problem_defaults(problem: Problem) -> dict[str, dict[str, Any]]:
     tau = DECAY / problem.decay_rate
     fastest = float(np.abs(problem.closed_loop_modes).max())
     period = _rounded(HELD / fastest)
-    learning = period * max(round(shipped.period * tau / period), 1)
+    learning = period * max(round(PERIOD * tau / period), 1)
     horizon = _rounded(shipped.horizon * tau)
     longest = 5.0 / 3.0 * horizon * fastest / STABLE  # steps whose last is 5/3 of their mean
     return {

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from ...online import draw_samples, load
+from ...online.loop import require_held
 from ...symbolic import RunError, Setup
 from ..merit import Regret, RunMetrics
 from ..optima import Ideal
@@ -115,7 +116,7 @@ class Comparison:
 
     @property
     def faults(self) -> list[str]:
-        """What did not converge: runs that ended early and certificates that failed."""
+        """What failed: runs that ended early or learned nothing, and certificates."""
         found = []
         for i, optimum in enumerate(self.optima):
             where = f"state {i + 1}, " if i else ""
@@ -128,6 +129,8 @@ class Comparison:
                 stopped = runs[name].stopped
                 if stopped:
                     found.append(f"{where}{label_of(name)}: {stopped}")
+            if runs["learned"].unlearned:
+                found.append(f"{where}{label_of('learned')}: {runs['learned'].unlearned}")
         return found
 
 
@@ -154,10 +157,13 @@ def compared(
 
     Raises
     ------
+    InputError
+        If the control period can't hold the game.
     RunError
         If the offline solver does not converge from the scenario's own state, or a worker was lost.
     """
     setup = scenario.setup()
+    require_held(setup.problem, scenario.simulation.control_period)
     made = make_all(scenarios_from(scenario, n_states), own, folder, n_workers, tell)
     if made.optima[OPTIMUM][0].value is None:
         raise RunError(made.optima[OPTIMUM][0].fault)

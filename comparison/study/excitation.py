@@ -15,6 +15,7 @@ import numpy as np
 
 from ...offline import Plant
 from ...online import AS_PRINTED, Learner, LearnerSettings, draw_samples, rank_margin
+from ...online.learning import learning_period
 from ...symbolic import Basis, Problem, RunError, Setup, quadratic
 from ...symbolic.arrays import Array
 from ..scenario import Scenario
@@ -71,7 +72,8 @@ def excitation_runs(
     [s] and the gains are for the pace of the shipped vehicle, and follow that of another problem.
     """
     setup, name = scenario.setup(), subject(scenario.setup())
-    eager = scenario.learner.model_copy(update=plain(setup, scenario.learner.period))
+    period = learning_period(setup.problem, scenario.learner)
+    eager = scenario.learner.model_copy(update=plain(setup, period) | {"period": period})
     cautious = eager.model_copy(update={"covariance": 1e2, "covariance_bound": 1e3})
     envelope, start = shrink * setup.envelope, shrink * scenario.initial_state
     seed = scenario.samples.seed
@@ -135,7 +137,7 @@ def excitation_run(
     """Learn along one trajectory in game mode, policies evaluated continuously."""
     learner = Learner(problem, basis, settings, samples, basis.quadratic_weights(problem.P))
     plant = Plant(problem)
-    zeta, dt = zeta0, settings.period
+    zeta, dt = zeta0, learning_period(problem, settings)
     gram = np.zeros((basis.n_basis, basis.n_basis))
     rows: list[tuple[float, float, float, float]] = []
     stopped = None

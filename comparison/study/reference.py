@@ -134,11 +134,14 @@ class GameOptimum(Reference):
             f"The learned policy costs {100 * learned:.3f} % more than the optimum{states}; the linear "
             f"H-infinity policy, which learns nothing, {100 * linear:.2f} %"
         )
+        better = _better(_everywhere(regrets))
+        if runs["learned"].unlearned:
+            return f"{told}. Nothing was learned.{better}"
         if linear <= 0.0:  # nothing was left to learn
-            return f"{told}."
+            return f"{told}.{better}"
         change = 100 * (learned - linear) / linear
         outcome = f"takes {-change:.0f} % off" if change < 0 else f"adds {change:.0f} % to"
-        return f"{told}: learning {outcome} the excess."
+        return f"{told}: learning {outcome} the excess.{better}"
 
 
 class ClairvoyantOptimum(Reference):
@@ -207,17 +210,36 @@ class ClairvoyantOptimum(Reference):
         if not self.known:
             share = 100.0 * (learned - linear) / linear
             words = f"{-share:.1f} % less" if share < 0.0 else f"{share:.1f} % more"
-            return f"{sentence}. The learned policy costs {words} than the linear H-infinity policy."
-        return (
-            f"{sentence}: over the same run the learned policy costs {100 * learned:.2f} % more than "
-            f"it, the linear H-infinity policy {100 * linear:.2f} %."
-        )
+            told = f"{sentence}. The learned policy costs {words} than the linear H-infinity policy."
+        else:
+            told = (
+                f"{sentence}: over the same run the learned policy costs {100 * learned:.2f} % more "
+                f"than it, the linear H-infinity policy {100 * linear:.2f} %."
+            )
+        nothing = " Nothing was learned." if runs["learned"].unlearned else ""
+        costs = {name: run.regret if self.known else run.running_cost for name, run in runs.items()}
+        return f"{told}{nothing}{_better({k: c for k, c in costs.items() if c is not None})}"
 
 
 BY_MODE: dict[str, type[GameOptimum] | type[ClairvoyantOptimum]] = {
     "game": GameOptimum,
     "disturbed": ClairvoyantOptimum,
 }
+
+
+def _everywhere(regrets: Mapping[str, Regret] | None) -> dict[str, float]:
+    """Return the median regret of each policy that was run from as many states as the learned one."""
+    known = {} if regrets is None else regrets
+    return {name: regret.median for name, regret in known.items() if regret.n == known["learned"].n}
+
+
+def _better(costs: Mapping[str, float]) -> str:
+    """Return the sentence that names the policies that cost less than the learned one, or nothing."""
+    names = [label_of(name) for name, cost in costs.items() if cost < costs["learned"]]
+    if not names:
+        return ""
+    listed = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+    return f" Better than learned: {listed}."
 
 
 def reference_of(scenario: Scenario) -> type[GameOptimum] | type[ClairvoyantOptimum]:

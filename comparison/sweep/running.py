@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
+from ...online.loop import require_held
 from ...online.records import writable_folder
 from ...symbolic import InputError, StationkeepError
 from ...symbolic.arrays import Array
@@ -93,6 +94,7 @@ def sweep(
     """
     started = time.monotonic()
     one = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
+    require_held(one.setup().problem, one.simulation.control_period)
     told = progress if progress is not None else _silent
     bench = WorkerSettings(one, records, every)
     asked = [f"envelope.scale={','.join(map(str, scales))}"] if len(scales) else []

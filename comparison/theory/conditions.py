@@ -18,6 +18,7 @@ from ...symbolic.arrays import Array
 from ..optima import Bounds
 from ..scenario import Scenario
 from .condition import Condition
+from .numerical_conditions import numerical_conditions
 from .problem_conditions import domain_conditions, equilibrium
 from .vehicle_conditions import vehicle_conditions, vehicle_equilibrium
 
@@ -53,6 +54,7 @@ def scenario_conditions(
         *_samples(scenario, learner),
         *_gains(scenario, setup, margin, bounds),
         *_attenuation(setup),
+        *numerical_conditions(scenario),
     ]
 
 

@@ -3,14 +3,18 @@
 from .learner import Learner
 from .learner_step import LearnerStep
 from .monitor import Monitor, MonitorSample
-from .settings import AS_PRINTED, LearnerSettings, SampleSettings
+from .pace import learning_period, paid_share
+from .settings import AS_PRINTED, PERIOD, LearnerSettings, SampleSettings
 
 __all__ = [
     "AS_PRINTED",
+    "PERIOD",
     "Learner",
     "LearnerSettings",
     "LearnerStep",
     "Monitor",
     "MonitorSample",
     "SampleSettings",
+    "learning_period",
+    "paid_share",
 ]

@@ -139,5 +139,5 @@ class Safeguard:
         return Accepted(start.actors, 0.0, start.cost, self._linear(zeta, start.cost))
 
     def _linear(self, zeta: Array, cost: float) -> bool:
-        """Return whether the linear policy is predicted to cost less, or nothing is predicted at all."""
+        """Return whether the linear policy is predicted to cost less, or J is infinite."""
         return self.may_use_linear and (cost == np.inf or self.costs.linear_cost(zeta) < cost)

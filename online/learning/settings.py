@@ -29,6 +29,7 @@ AS_PRINTED: dict[str, Any] = {
     "gain_actor_2": 2.0,
 }
 """What makes a learner that of the paper: (16)-(21) as printed, nothing that holds the weights."""
+PERIOD = 0.25  # s, between learning steps, where the problem leaves time for it
 RULES = ("gradient", "least_squares")
 
 
@@ -54,7 +55,7 @@ class LearnerSettings(Settings):
     covariance, covariance_bound : Γ(0) and Γ_max as multiples of the identity
     leash : strength of the ridge towards the reference weights, relative to what the samples know of
         each weight at the start; 0 is none
-    period : time between learning steps [s]
+    period : time between learning steps [s]; `learning_period` chooses it when not given
     weights : start from the Riccati solution (`riccati`) or from the record of a run (its path)
     weights_vehicle : whose Riccati solution that is, a shipped name or the path of a TOML file; the
         scenario's own vehicle when not given
@@ -79,7 +80,7 @@ class LearnerSettings(Settings):
     covariance: PositiveFloat = 1e6
     covariance_bound: PositiveFloat = 1e8
     leash: NonNegativeFloat = 0.001
-    period: PositiveFloat = 0.25
+    period: PositiveFloat | None = None
     weights: str = "riccati"
     weights_vehicle: str | None = None
     weight_factor: float = 1.0
@@ -108,9 +109,10 @@ class LearnerSettings(Settings):
                 f"covariance is {self.covariance:g}, but must not exceed covariance_bound = "
                 f"{self.covariance_bound:g}; raise the bound"
             )
-        if self.forgetting * self.period > 1.0:
+        period = PERIOD if self.period is None else self.period
+        if self.forgetting * period > 1.0:
             raise ValueError(
-                f"forgetting * period is {self.forgetting * self.period:g}, but must be at most 1 for "
+                f"forgetting * period is {self.forgetting * period:g}, but must be at most 1 for "
                 "the covariance to stay bounded; learn more often or forget more slowly"
             )
         if self.weights_vehicle is not None and self.weights != "riccati":

@@ -3,6 +3,7 @@
 from .feedback import Feedback, FunctionPolicy
 from .held import HeldRates
 from .history import History
+from .hold import MeanState, require_held
 from .loop import Progress, System, drive
 from .plant import PlantState, ProblemPlant
 from .policy import LearnedPolicy, LearnerScenario, Policy, fixed_points
@@ -17,6 +18,7 @@ __all__ = [
     "History",
     "LearnedPolicy",
     "LearnerScenario",
+    "MeanState",
     "PlantState",
     "Policy",
     "ProblemPlant",
@@ -26,4 +28,5 @@ __all__ = [
     "System",
     "drive",
     "fixed_points",
+    "require_held",
 ]

@@ -9,8 +9,9 @@ import numpy as np
 from ...symbolic import InputError, Setup
 from ...symbolic.arrays import Array
 from ..laws import Critic
-from ..learning import Learner, LearnerSettings, LearnerStep, SampleSettings
+from ..learning import Learner, LearnerSettings, LearnerStep, SampleSettings, learning_period
 from ..rows import draw_samples
+from .hold import MeanState
 
 
 class Policy(Protocol):
@@ -78,7 +79,7 @@ class LearnedPolicy:
     period : time between learning steps [s]
     certify : whether frozen weights are certified
     zeta : (n,) the last state
-    u_control, u_disturbance : (k,) û_1 and û_2 there
+    u_control, u_disturbance : (k,) û_1 and û_2 there, or at the mean state of the period (`MeanState`)
     last_step : what the last learning step saw; None where the last step did not learn
     """
 
@@ -102,8 +103,9 @@ class LearnedPolicy:
         # nothing to certify where the frozen weights are the reference's own
         safeguarded = not learn and scenario.learner.safeguard
         self.certify = safeguarded and weights is not None and weights is not reference
-        self.period = scenario.learner.period
+        self.period = learning_period(setup.problem, scenario.learner)
         self._since: float | None = None
+        self._mean_state = MeanState(setup.problem)
         self.last_step: LearnerStep | None = None
         self.zeta = np.zeros(setup.problem.n_states)
         self.u_control = np.zeros(setup.problem.n_inputs)
@@ -128,7 +130,7 @@ class LearnedPolicy:
             self.last_step = self.learner.certify(zeta)
             since = 0.0
         self._since = since
-        self.u_control, self.u_disturbance = self.learner.policies(zeta)
+        self.u_control, self.u_disturbance = self.learner.policies(self._mean_state(zeta, dt))
         return self.u_control
 
 

@@ -20,6 +20,12 @@ class Predictor:
     def __init__(self, functions: ValueFunctions, horizon: float, n_steps: int) -> None:
         self._prediction = functions.prediction(horizon, n_steps)
 
+    @property
+    def method(self) -> str:
+        """What integrates, in words."""
+        stepping = self._prediction.stepping
+        return f"{len(stepping.steps)} steps of {stepping.method}"
+
     def cost(self, zeta: Array, actor_1: Array, actor_2: Array) -> float:
         """Return J from ζ (n,) of the policies (14)(15), infinite if they lose the vehicle."""
         return self._prediction.path(zeta, actor_1, actor_2).cost

@@ -122,8 +122,8 @@ def export(
 def max_difference(first: Kernel, second: Kernel, n_points: int = 20, seed: int = 0) -> float:
     """Return the largest norm-relative difference of all outputs over seeded random arguments.
 
-    Arguments are uniform on (-1, 1), which keeps a pitch inside ±90 degrees, or a tenth of that as often
-    as it takes until the results of the first are finite; the inputs of both are zero afterwards.
+    Arguments are uniform on (-1, 1), which keeps a pitch inside ±90 degrees, or a tenth of that as
+    often as it takes until the results of the first are finite; the inputs of both are zero afterwards.
     """
     rng = np.random.default_rng(seed)
     worst = 0.0

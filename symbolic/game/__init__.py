@@ -4,18 +4,25 @@ from .domain import Bound, margins_and_shown, outside, require_numbers
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import InverseDynamics, Problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
+from .sampled import MEAN_FROM, HeldLoop, fastest_mode, held_loop, longest_period, mean_matrix
 from .stored import problem_from_data, problem_to_data
 
 __all__ = [
+    "MEAN_FROM",
     "Bound",
     "Game",
+    "HeldLoop",
     "InverseDynamics",
     "Problem",
+    "fastest_mode",
     "game_riccati",
     "gamma_hamiltonian",
     "gamma_star",
     "gamma_threshold",
+    "held_loop",
+    "longest_period",
     "margins_and_shown",
+    "mean_matrix",
     "outside",
     "problem_from_data",
     "problem_to_data",

@@ -1,12 +1,12 @@
 """The linearised loop when its control is held: whether the control period can hold the game.
 
-The inputs are computed every h and held, so that the linearised plant goes from one period to the next by
+The inputs are computed every h and held, so that the linearised plant goes from period to period by
 
     ζ_{k+1} = Φ(h) ζ_k + Γ(h) u_k,   Φ(h) = e^{Ah},   Γ(h) = ∫_0^h e^{As} ds B
 
-(zero-order hold; Franklin, Powell and Workman 1998, ch. 4). Modes of the plant itself decay under a hold
-as they do without it, however fast they are. What the feedback makes fast has to be slow against the
-period.
+(zero-order hold; Franklin, Powell and Workman 1998, ch. 4). Modes of the plant itself decay under a
+hold as they do without it, however fast they are. What the feedback makes fast has to be slow against
+the period.
 
 A policy that was found for continuous time is best held at what it would ask for on average over the
 period. To first order that is its value at the mean state of the closed loop A_c over it,
@@ -54,7 +54,7 @@ class HeldLoop:
 
 
 def held_loop(problem: Problem, period: float) -> HeldLoop:
-    """Return the loop under the linear policies, held for `period` [s] at their mean state."""
+    """Return the loop under the linear policies, held for `period` [s]."""
     radius = held_radius(problem, period)
     bound = float(np.exp(-MARGIN * problem.decay_rate * period))
     return HeldLoop(radius, bound, _gain_margin(problem, period))
@@ -68,9 +68,8 @@ def held_radius(problem: Problem, period: float, factor: float = 1.0) -> float:
     A, B = problem.linearization
     n, k = B.shape
     powers = scipy.linalg.expm(period * np.block([[A, B], [np.zeros((k, n + k))]]))
-    mean = mean_matrix(problem, period)
     gains = (problem.linear_gain, -problem.linear_gains[0])
-    closed = (powers[:n, :n] + factor * powers[:n, n:] @ gain @ mean for gain in gains)
+    closed = (powers[:n, :n] + factor * powers[:n, n:] @ gain for gain in gains)
     return max(float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in closed)
 
 
@@ -87,19 +86,21 @@ def longest_period(problem: Problem, most: float) -> float:
 def fastest_mode(problem: Problem) -> tuple[float, str]:
     """Return |λ| of the fastest mode of the closed loop [1/s], and the state that it moves most.
 
-    States are weighed by the envelope's half-widths; the name is the problem's own.
+    Of the loops under both players and under u_1 alone. States are weighed by the envelope's
+    half-widths; the name is the problem's own.
     """
     A, B = problem.linearization
-    values, vectors = np.linalg.eig(A + B @ problem.linear_gain)
-    fastest = int(np.abs(values).argmax())
-    moved = np.abs(vectors[:, fastest]) / problem.scale
-    return float(np.abs(values[fastest])), problem.state_names[int(moved.argmax())]
+    found = []
+    for gain in (problem.linear_gain, -problem.linear_gains[0]):
+        values, vectors = np.linalg.eig(A + B @ gain)
+        fastest = int(np.abs(values).argmax())
+        moved = np.abs(vectors[:, fastest]) / problem.scale
+        found.append((float(np.abs(values[fastest])), problem.state_names[int(moved.argmax())]))
+    return max(found)
 
 
 def mean_matrix(problem: Problem, period: float) -> Array:
-    """Return φ_1(A_c h), (n, n), or the identity where the closed loop is slow against the period."""
-    if period * float(np.abs(problem.closed_loop_modes).max()) <= MEAN_FROM:
-        return np.eye(problem.n_states)
+    """Return φ_1(A_c h), (n, n), which makes the state its mean over the period [s]."""
     A, B = problem.linearization
     return phi_functions((A + B @ problem.linear_gain) * period)[1]
 

@@ -69,12 +69,14 @@ class Stepping(Protocol):
     ----------
     steps : (N,) [s]
     parameters : what every step is told, by name, (rows, columns N), the columns of a step side by side
+    method : in words
     relative : whether the cost is that beyond ζ'P ζ of the state where it starts, whose end then costs
         nothing; otherwise the end costs ζ'P ζ
     """
 
     steps: Array
     parameters: dict[str, Array]
+    method: str
     relative: bool
 
     def step(self, rate: Rate, y: MX, parameters: list[MX]) -> MX:
@@ -85,6 +87,7 @@ class Stepping(Protocol):
 class RungeKutta:
     """The classical method of order four, with given steps (N,) [s]."""
 
+    method = "the classical Runge-Kutta method"
     relative = False
 
     def __init__(self, steps: Array) -> None:
@@ -99,6 +102,7 @@ class RungeKutta:
 class Exponential:
     """Krogstad's exponential method around the linearised closed loop, with given steps (N,) [s]."""
 
+    method = "the exponential Runge-Kutta method"
     relative = True
 
     def __init__(self, problem: Problem, steps: Array) -> None:
