@@ -1,5 +1,6 @@
 """The zero-sum game (4)-(9): weights, Riccati equation, and the problem of a game on a plant."""
 
+from .angles import Angles, AngleTracker, Equivalence
 from .domain import Bound, margins_and_shown, outside, require_numbers
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import InverseDynamics, Problem
@@ -7,7 +8,10 @@ from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_so
 from .stored import problem_from_data, problem_to_data
 
 __all__ = [
+    "AngleTracker",
+    "Angles",
     "Bound",
+    "Equivalence",
     "Game",
     "InverseDynamics",
     "Problem",
