@@ -184,8 +184,8 @@ def test_a_run_is_counted_by_the_turn_that_it_took() -> None:
     def policy(zeta: Array) -> Array:
         return -gain[:1] * np.arctan2(np.sin(zeta[0]), np.cos(zeta[0])) - gain[1:] * zeta[1]
 
-    record = simulate(problem, policy, [3.0, 0.8], n * dt, control_period=dt)
-    angle, rate, cost = 3.0 - TURN, 0.8, 0.0
+    record = simulate(problem, policy, [3.1, 1.5], n * dt, control_period=dt)
+    angle, rate, cost = 3.1 - TURN, 1.5, 0.0
     nodes, weights = np.polynomial.legendre.leggauss(3)
     for i in range(n):
         np.testing.assert_allclose(record["zeta"].values[i], [angle, rate], atol=1e-6)
@@ -195,7 +195,7 @@ def test_a_run_is_counted_by_the_turn_that_it_took() -> None:
         cost += 0.5 * dt * float(weights @ local)
         angle, rate = angle + rate * dt + 0.5 * a * dt**2, rate + a * dt
     assert float(record["cost"][-1]) == pytest.approx(cost, rel=1e-6)
-    assert float(record["cost"][-1] - record["attenuated"][-1]) > least_of(np.array([3.0, 0.8]))
+    assert float(record["cost"][-1] - record["attenuated"][-1]) > least_of(np.array([3.1, 1.5]))
 
 
 def least_of(zeta: Array) -> float:
@@ -241,7 +241,7 @@ def test_the_vehicles_value_by_each_turn() -> None:
     problem = quick_scenario().setup().problem
     value, direct = QuickValue(problem), DirectSolver(problem, MeshSettings.quick)
     turn, turning = TURN * np.eye(12)[5], np.eye(12)[11]
-    for zeta in (3.0 * np.eye(12)[5], 3.0 * np.eye(12)[5] + turning):
+    for zeta in (3.0 * np.eye(12)[5], 3.1 * np.eye(12)[5] + turning):
         here, there = (direct.solve(way, verify=False).value for way in (zeta, zeta - turn))
         assert value(zeta) == min(here, there)
         assert value(zeta + turn) == pytest.approx(min(here, there), rel=1e-9)

@@ -22,9 +22,9 @@ FARTHEST = 2.5  # periods of an angle that a start may be given with; degrees ar
 # Part of a period beyond half of it at which a measured angle is written from the other side: what
 # overshoots half a turn keeps its way home, and noise there does not turn the vehicle to and fro.
 HYSTERESIS = 1.0 / 8.0
-# Part of a period before half of it from which on the other turn's value is looked at too; how far
-# from half a period the two values are equal was measured (docs/theory/optimum.md).
-BAND = 1.0 / 8.0
+# Part of a period before half of it from which on the other turn's value is looked at too: 0.18 of a
+# period from half of it at most are the two values equal (docs/theory/optimum.md).
+BAND = 1.0 / 4.0
 
 
 @dataclass(frozen=True)

@@ -14,23 +14,9 @@ from ..arrays import Array
 from ..errors import GammaTooSmallError, InputError
 from . import riccati
 from .angles import Angles, Equivalence
-from .checks import require_inverse, require_periodic
+from .checks import InverseDynamics, require_inverse, require_periodic
 from .domain import Bound, margins_and_shown, outside, require_numbers
 from .game import Game
-
-
-@dataclass(frozen=True, eq=False)
-class InverseDynamics:
-    """The input that gives a fully actuated plant a wanted acceleration.
-
-    Attributes
-    ----------
-    acceleration : (k,) symbol a = η_ddot
-    v : (k,) expression of ζ = (η, η_dot) and a with f(ζ) + g(ζ) v = (η_dot, a)
-    """
-
-    acceleration: SX
-    v: SX
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +89,11 @@ class Problem:
             )
         self.require_state(np.zeros(n))
         if self.inverse_dynamics is not None:
-            require_inverse(self, self.inverse_dynamics)
+            f, g = self.drift, self.control_matrix
+            require_inverse(self.name, self.zeta, f, g, self.inverse_dynamics, self.scale)
         if self.periods:
-            require_periodic(self, self.periods)
+            terms = casadi.horzcat(self.drift, self.control_matrix, self.disturbance_matrix)
+            require_periodic(self.name, self.zeta, terms, self.scale, self.state_names, self.periods)
 
     @property
     def n_states(self) -> int:

@@ -14,9 +14,10 @@ from ..arrays import Array
 from ..errors import InputError
 from ..expressions import from_data, to_data
 from .angles import Equivalence
+from .checks import InverseDynamics
 from .domain import Bound
 from .game import Game
-from .problem import InverseDynamics, Problem
+from .problem import Problem
 
 NAMES = ("state_names", "state_units", "input_names", "input_units")
 
@@ -83,8 +84,7 @@ def problem_from_data(data: Mapping[str, Any]) -> Problem:
             domain=domain,
             switching=parts["switching"],
             inverse_dynamics=inverse,
-            **{name: tuple(map(str, data[name])) for name in NAMES},
-            **_angles_from_data(data),
+            **_names_and_angles(data),
         )
     except (KeyError, TypeError, IndexError) as error:
         raise InputError(f"these are not the data of a problem ({error!r}); make them again") from None
@@ -98,8 +98,9 @@ def _angles_to_data(problem: Problem) -> dict[str, Any]:
     return said
 
 
-def _angles_from_data(data: Mapping[str, Any]) -> dict[str, Any]:
-    said: dict[str, Any] = {"periods": tuple(_matrix(data.get("periods", [])).ravel().tolist())}
+def _names_and_angles(data: Mapping[str, Any]) -> dict[str, Any]:
+    said: dict[str, Any] = {name: tuple(map(str, data[name])) for name in NAMES}
+    said["periods"] = tuple(_matrix(data.get("periods", [])).ravel().tolist())
     if "equivalence" in data:
         second = data["equivalence"]
         signs, shift = (tuple(_matrix(second[name]).ravel().tolist()) for name in ("signs", "shift"))
