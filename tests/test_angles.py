@@ -287,6 +287,15 @@ def test_metres_are_not_told_to_be_radians() -> None:
     assert "rad" not in str(error.value)
 
 
+def test_a_start_is_not_turned_upside_down() -> None:
+    """Beyond 90 degrees of pitch the second way is taken where it is upright, else it is refused."""
+    problem = quick_scenario().setup().problem
+    for way in ways(STATE):
+        np.testing.assert_allclose(problem.initial_state(way), STATE, atol=1e-14)
+    with pytest.raises(InputError, match=r"pitch is 114\.6 deg"):
+        problem.initial_state(2.0 * np.eye(12)[4])
+
+
 def test_states_given_to_the_solvers_are_looked_at_too() -> None:
     with pytest.raises(InputError, match="angles are in rad"):
         solve(spin(), [90.0, 0.0])

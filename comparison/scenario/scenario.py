@@ -248,7 +248,7 @@ class Scenario(Settings):
         """ζ(0), (n,): the settings', or half of the envelope's half-widths; angles the short way."""
         problem, given = self._setup.problem, self.simulation.initial_state
         state = 0.5 * self._setup.envelope if given is None else given
-        return problem.angles.wrapped(require_numbers(state, problem.state_names))
+        return problem.angles.start(require_numbers(state, problem.state_names))
 
     @cached_property
     def _setup(self) -> Setup:

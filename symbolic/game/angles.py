@@ -69,6 +69,16 @@ class Angles:
         mirrored = np.array(other.signs) * short + np.array(other.shift)
         return self._less_turns(mirrored, mirrored)
 
+    def start(self, zeta: Array) -> Array:
+        """Return a start ζ (n,) written the short way, the second way only where that is no farther.
+
+        What is beyond the limit without need, such as a pitch over 90 degrees of a vehicle that is
+        level otherwise, stays as it is written: rather wrong than meant upside down.
+        """
+        short, second = self._less_turns(zeta, zeta), self.wrapped(zeta)
+        turns = self._period > 0.0
+        return second if np.abs(second[turns]).sum() <= np.abs(short[turns]).sum() else short
+
     def beside(self, zeta: Array, last: Array) -> Array:
         """Return ζ (n,) less whole periods, its angles within half a period of those of `last`."""
         return self._less_turns(zeta, zeta - last)
@@ -84,7 +94,7 @@ class Angles:
         return np.where(far, zeta - self.turns(zeta) * self._period, zeta)
 
     def candidates(self, zeta: Array, P: Array) -> list[Array]:
-        """Return the ways to write ζ (n,) from which the value may be least, the short one first.
+        """Return the ways to write a start ζ (n,) from which the value may be least, itself first.
 
         The quadratic value ζ'P ζ is least over one angle alone where a = (P ζ)_i / P_ii is zero. So an
         angle counts from there, rates and other errors included, and where |a| exceeds half a period
@@ -94,14 +104,13 @@ class Angles:
         ----------
         P : (n, n) of the quadratic value at the origin
         """
-        short = self.wrapped(zeta)
         if not self._period.any():
-            return [short]
+            return [zeta]
         shifts: list[tuple[float, ...]] = []
-        for period, away in zip(self.periods, P @ short / np.diag(P), strict=True):
+        for period, away in zip(self.periods, P @ zeta / np.diag(P), strict=True):
             both = period > 0.0 and abs(away) > (0.5 - BAND) * period
             shifts.append((0.0, -float(np.copysign(period, away))) if both else (0.0,))
-        return [short + np.array(shift) if any(shift) else short for shift in product(*shifts)]
+        return [zeta + np.array(shift) if any(shift) else zeta for shift in product(*shifts)]
 
     def require_near(self, zeta: Array, names: Sequence[str], units: Sequence[str]) -> None:
         """Raise InputError for a start ζ (n,) with an angle of more turns than anybody writes."""

@@ -148,14 +148,14 @@ class Problem:
         """
         state = require_numbers(zeta, self.state_names)
         self.angles.require_near(state, self.state_names, self.state_units)
-        return self.require_state(self.angles.wrapped(state))
+        return self.require_state(self.angles.start(state))
 
     def starts(self, zeta: ArrayLike) -> list[Array]:
         """Return ζ (n,) by each turn from which V* may be least, the short way first.
 
         Raises as `require_state`, with the angles written the short way.
         """
-        first = self.require_state(self.angles.wrapped(require_numbers(zeta, self.state_names)))
+        first = self.require_state(self.angles.start(require_numbers(zeta, self.state_names)))
         if not self.periods:
             return [first]
         others = self.angles.candidates(first, self.P)[1:]

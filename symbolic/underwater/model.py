@@ -241,4 +241,4 @@ def vehicle_initial_state(zeta: ArrayLike) -> Array:
     """
     state = require_numbers(zeta, STATE_NAMES)
     ANGLES.require_near(state, STATE_NAMES, STATE_UNITS)
-    return require_vehicle_state(ANGLES.wrapped(state))
+    return require_vehicle_state(ANGLES.start(state))
