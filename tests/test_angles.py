@@ -13,6 +13,7 @@ import pytest
 from casadi import SX
 from stationkeep import gamma_curve, saddle_gap, simulate, solve, worst_case
 from stationkeep.comparison import Scenario
+from stationkeep.comparison.adapters.control import to_control
 from stationkeep.comparison.adapters.gym import StationKeepingEnv
 from stationkeep.offline import DirectSolver, MeshSettings, QuickValue
 from stationkeep.online import Controller, DisturbanceObserver, run
@@ -156,13 +157,14 @@ def yawed(yaw: float, *more: str) -> Scenario:
 
 def test_one_pose_has_one_cost() -> None:
     costs = []
-    for yaw in (3.2, 3.2 - TURN):
+    for yaw in (3.2 - TURN, 3.2, 3.2 + TURN):
         scenario = yawed(yaw)
         history = run(scenario, linear_on(scenario.station_keeping()))
         assert history.stopped is None
         assert abs(history.zeta[-1][5]) < 0.1
         costs.append(history.cost[-1])
     assert costs[0] == costs[1] == pytest.approx(2063.0, abs=1.0)
+    assert costs[2] == pytest.approx(costs[0], rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -306,6 +308,14 @@ def test_an_environment_sees_one_attitude() -> None:
     seen, _ = env.reset(seed=0, options={"state": STATE})
     for way in ways(STATE):
         np.testing.assert_allclose(env.reset(seed=0, options={"state": way})[0], seen, atol=1e-6)
+
+
+def test_a_closed_loop_for_other_tools_takes_one_attitude() -> None:
+    scenario = quick_scenario()
+    system = to_control(scenario, linear_on(scenario.station_keeping()))
+    expected = system.output(0.0, STATE, np.zeros(6))[12:]
+    for way in ways(STATE):
+        np.testing.assert_allclose(system.output(0.0, way, np.zeros(6))[12:], expected, rtol=1e-9)
 
 
 def test_the_observers_estimate_does_not_hang_on_turns() -> None:
