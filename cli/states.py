@@ -16,7 +16,7 @@ from ..symbolic.arrays import Array
 def initial_states(options: argparse.Namespace, scenario: Scenario) -> list[Array]:
     """Return the initial states of the command line, or the scenario's."""
     problem = scenario.setup().problem
-    states = [problem.require_state(_parse(text, problem)) for text in options.state or []]
+    states = [problem.initial_state(_parse(text, problem)) for text in options.state or []]
     if options.states is not None:
         states += read_states(options.states, problem)
     return states or [scenario.initial_state]
@@ -51,7 +51,7 @@ def read_states(path: Path, problem: Problem) -> list[Array]:
     rows = []
     for i, row in enumerate(table):
         try:
-            rows.append(problem.require_state(row))
+            rows.append(problem.initial_state(row))
         except InputError as error:
             raise InputError(f"'{path}', row {i + 1}: {error}") from None
     return rows

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..symbolic import Problem, RunError
 from ..symbolic.arrays import Array
 from .certificate import Certificate
-from .direct import DirectSolution, DirectSolver, Refined, find_extremals, refine
+from .direct import DirectSolution, DirectSolver, Refined, by_turns, find_extremals, refine
 from .path import Trajectory, extended, halved
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings, horizon_of
@@ -29,6 +29,7 @@ class OfflineSolution:
     others : further extremals, the cheapest first, each on its own aligned mesh
     certificate : the error of `direct`
     faults : what breaks the tolerances; empty if the certificate holds
+    turns : (n,) whole periods by which the cheapest start is written off the short way
     rounds : of mesh refinement
     seconds : wall time, certificate included
     """
@@ -38,6 +39,7 @@ class OfflineSolution:
     others: list[DirectSolution]
     certificate: Certificate
     faults: list[str]
+    turns: tuple[int, ...]
     rounds: int
     seconds: float
 
@@ -66,6 +68,7 @@ class OfflineSolver:
     def solve(self, zeta0: Array, guess: Trajectory | None = None) -> OfflineSolution:
         """Return the optimum from `zeta0` and its certificate.
 
+        Near half a turn both turns are solved, and the cheaper one is the optimum; see `Angles`.
         `guess` is where the first solve starts, instead of the linear H-infinity policy; the other
         starts of the search for extremals, and the saddle point, don't use it.
 
@@ -77,8 +80,7 @@ class OfflineSolver:
             If no solver converges inside the domain.
         """
         started = time.perf_counter()
-        first = self.direct.solve(zeta0, guess=guess, verify=False)
-        refined, others = self._cheapest(first)
+        refined, others = self._cheapest(self._by_turns(zeta0, guess))
         saddle = self._saddle_point(refined.solution)
         certificate = self._certify(refined, others, saddle)
         return OfflineSolution(
@@ -87,26 +89,42 @@ class OfflineSolver:
             others=others,
             certificate=certificate,
             faults=certificate.faults(self.settings),
+            turns=tuple(int(n) for n in self.problem.angles.turns(refined.solution.zeta)),
             rounds=refined.rounds,
             seconds=time.perf_counter() - started,
         )
 
-    def _cheapest(self, first: DirectSolution) -> tuple[Refined, list[DirectSolution]]:
+    def _by_turns(self, zeta0: Array, guess: Trajectory | None) -> list[DirectSolution]:
+        """Return the first solve of each turn from which the value may be least."""
+        angles = self.problem.angles
+
+        def solve_from(start: Array) -> DirectSolution:
+            near = guess is not None and not angles.turns(guess.states[0] - start).any()
+            return self.direct.solve(start, guess=guess if near else None, verify=False)
+
+        return by_turns(self.problem.starts(zeta0), solve_from)
+
+    def _cheapest(self, firsts: list[DirectSolution]) -> tuple[Refined, list[DirectSolution]]:
         """Return the refined cheapest extremal, and the others on aligned meshes."""
-        extremals = find_extremals(self.direct, first, starts=self.settings.starts)
+        found = [
+            (first.zeta, extremal)
+            for first in firsts
+            for extremal in find_extremals(self.direct, first, starts=self.settings.starts)
+        ]
+        extremals = [extremal for _, extremal in found]
         if self.settings.aligned and len(extremals) > 1:
             # which is cheapest may hang on the error of the first mesh
             extremals = [
-                self.direct.solve_aligned(first.zeta, guess=each.trajectory, verify=False)[0]
-                for each in extremals
+                self.direct.solve_aligned(zeta, guess=each.trajectory, verify=False)[0]
+                for zeta, each in found
             ]
-            extremals.sort(key=lambda solution: solution.value)
+        extremals.sort(key=lambda solution: solution.value)
         best = extremals[0]
         refined = refine(self.direct, self.settings, best.zeta, best.trajectory)
         solution = replace(
             refined.solution,
-            iterations=first.iterations + refined.solution.iterations,
-            seconds=first.seconds + refined.solution.seconds,
+            iterations=sum(each.iterations for each in (*firsts, refined.solution)),
+            seconds=sum(each.seconds for each in (*firsts, refined.solution)),
         )
         return replace(refined, solution=solution), extremals[1:]
 
@@ -194,4 +212,4 @@ def solve(
     problem: Problem, zeta0: ArrayLike, settings: OfflineSettings | None = None
 ) -> OfflineSolution:
     """Return the certified optimum of a game from one state; see `OfflineSolver` for many."""
-    return OfflineSolver(problem, settings).solve(problem.require_state(zeta0))
+    return OfflineSolver(problem, settings).solve(problem.initial_state(zeta0))

@@ -34,7 +34,7 @@ def simulate(
     Parameters
     ----------
     policy : a function of the state that returns u_1 (k,), or an object with the steps of a `Policy`
-    zeta0 : (n,) initial state
+    zeta0 : (n,) initial state; its angles are taken the short way, and are continuous from there on
     duration, control_period : [s]
     mode : who disturbs
     disturbance : d(t, ζ) (k_2,) of `disturbed` mode; nothing disturbs if None
@@ -50,7 +50,7 @@ def simulate(
     >>> record = simulate(two_state_game(), lambda zeta: np.array([-zeta[1]]), [1.0, -1.5], 10.0)
     >>> float(record["cost"][-1] - record["attenuated"][-1])  # in the game
     """
-    start = problem.require_state(zeta0)
+    start = problem.initial_state(zeta0)
     keys = {"duration": duration, "control_period": control_period, "mode": mode}
     settings = validate(RunSettings, keys | {"initial_state": tuple(start.tolist())}, "simulate")
     driven = FunctionPolicy(problem, policy) if callable(policy) else policy

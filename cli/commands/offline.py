@@ -128,11 +128,12 @@ def _error(value: float | None) -> str:
 
 
 def _verdict(row: dict[str, Any]) -> str:
-    """Return that the state is certified, and how many other extremals there are."""
+    """Return that the state is certified, how many other extremals there are, and by which turn."""
+    turns = "".join(f", {name} {n:+d} turn" for name, n in row["turns"].items())
     if not row["certificate"]["gradient_unique"]:
-        return "yes; its gradient is not unique"
+        return f"yes{turns}; its gradient is not unique"
     others = len(row["extremals"])
-    return f"yes; the lowest of {others + 1} extremals" if others else "yes"
+    return f"yes{turns}; the lowest of {others + 1} extremals" if others else f"yes{turns}"
 
 
 def _into_csv(path: Path, problem: Problem, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:

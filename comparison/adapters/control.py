@@ -16,7 +16,7 @@ import numpy as np
 from ...online import Controller, VehiclePolicy
 from ...symbolic import InputError, Kernel, Model
 from ...symbolic.arrays import Array
-from ...symbolic.underwater import FORCE_NAMES, STATE_NAMES
+from ...symbolic.underwater import ANGLES, FORCE_NAMES, STATE_NAMES
 from ..policies import LinearPolicy, OnVehicle
 from ..scenario import Scenario
 
@@ -94,11 +94,10 @@ def _closed(
 
 
 def _wrench(model: Model, law: Law) -> Law:
-    """Return τ_b = J'(u_1(ζ) + u_trim), the yaw wrapped as the policies wrap it."""
+    """Return τ_b = J'(u_1(ζ) + u_trim), the attitude written the short way as policies take it."""
 
     def wrench(zeta: Array) -> Array:
-        wrapped = np.array(zeta)
-        wrapped[5] -= 2.0 * np.pi * np.round(wrapped[5] / (2.0 * np.pi))
+        wrapped = ANGLES.wrapped(np.asarray(zeta, dtype=float))
         (J,) = model.kinematics(wrapped[:6])
         return np.asarray(J.T @ (law(wrapped) + model.u_trim))
 

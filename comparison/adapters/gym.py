@@ -5,6 +5,7 @@ Needs `pip install 'stationkeep[gym]'`; nothing else imports this module.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -97,14 +98,16 @@ class StationKeepingEnv(gymnasium.Env[Single, Single]):
     ) -> tuple[Single, dict[str, Any]]:
         """Start at envelope x U(-1, 1)^12 x U(inner, 1), or at `options["state"]`, ζ (12,).
 
-        `inner` is that of [samples]. Raises InputError for what is no state.
+        `inner` is that of [samples]. The attitude is taken the short way and is continuous from there
+        on, until an angle gets farther than half a turn and an eighth. Raises InputError for what is no
+        state.
         """
         super().reset(seed=seed)
         radius = self.np_random.uniform(self.scenario.samples.inner, 1.0)
         drawn = self.station.envelope * self.np_random.uniform(-1.0, 1.0, 12) * radius
         noise = {"seed": int(self.np_random.integers(2**31))}
         self._noise = MeasurementNoise(self.settings.noise.model_copy(update=noise))
-        start = self.station.problem.require_state((options or {}).get("state", drawn))
+        start = self.station.problem.initial_state((options or {}).get("state", drawn))
         self._state, self._steps = PlantState(start, 0.0, 0.0), 0
         return self._seen(), self._info("")
 
@@ -120,7 +123,9 @@ class StationKeepingEnv(gymnasium.Env[Single, Single]):
         before, stopped = self._state, ""
         try:
             wrench = self._wrench(action)
-            self._state = self._plant.advance(self._time, before, wrench, np.zeros(6), period)
+            reached = self._plant.advance(self._time, before, wrench, np.zeros(6), period)
+            short = self.station.problem.angles.reentered(reached.zeta)
+            self._state = replace(reached, zeta=short)
             stopped = self._left()
         except RunError as error:
             stopped = str(error)

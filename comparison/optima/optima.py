@@ -110,6 +110,7 @@ class Optima:
                 "u_disturbance": u_disturbance,
                 "certificate": {name: _entry(name, attributes[name]) for name in CERTIFICATE},
                 "extremals": json.loads(str(attributes["extremals"])),
+                "turns": _turns(str(attributes.get("turns", "[]")), problem.state_names),
                 "iterations": int(attributes["iterations"]),
                 "seconds": float(attributes["seconds"]),
                 "certified_seconds": seconds,
@@ -121,6 +122,11 @@ def _entry(name: str, value: Any) -> float | bool:
     return bool(value) if name in VERDICTS else float(value)
 
 
+def _turns(text: str, names: Sequence[str]) -> dict[str, int]:
+    """Return the states of the optimum that are whole periods off the short way, and by how many."""
+    return {name: n for name, n in zip(names, json.loads(text), strict=False) if n}
+
+
 def _failure(zeta: Array, reason: str, seconds: float | None) -> dict[str, Any]:
     unknown = ("value", "costate", "u_control", "u_disturbance", "iterations", "seconds")
     return {
@@ -128,6 +134,7 @@ def _failure(zeta: Array, reason: str, seconds: float | None) -> dict[str, Any]:
         **dict.fromkeys(unknown),
         "certificate": dict.fromkeys(CERTIFICATE),
         "extremals": [],
+        "turns": {},
         "certified_seconds": seconds,
         "faults": [reason],
     }

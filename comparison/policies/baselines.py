@@ -8,6 +8,7 @@ from ...online import Policy
 from ...online.loop import Feedback, MeanState
 from ...symbolic import Game, Problem, StationKeeping
 from ...symbolic.arrays import Array
+from ...symbolic.game import AngleTracker
 
 
 class LinearPolicy(Feedback):
@@ -49,12 +50,13 @@ class OnVehicle:
     ----------
     policy : that is asked
     station : vehicle and game
-    zeta : (12,) the last state, yaw within ±π
+    zeta : (12,) the last state, its attitude as it continues the one before (`AngleTracker`)
     """
 
     def __init__(self, policy: Policy, station: StationKeeping) -> None:
         self.policy, self.station = policy, station
         self.zeta = np.zeros(12)
+        self._angles = AngleTracker(station.problem.angles)
 
     @property
     def u_control(self) -> Array:
@@ -68,8 +70,7 @@ class OnVehicle:
 
     def step(self, eta: Array, eta_dot: Array, dt: float) -> Array:
         """Return the body wrench J'(u_1 + u_trim) to hold for dt, shape (6,)."""
-        self.zeta = np.concatenate([eta, eta_dot])
-        self.zeta[5] -= 2.0 * np.pi * np.round(self.zeta[5] / (2.0 * np.pi))
+        self.zeta = self._angles.enter(np.concatenate([eta, eta_dot]))
         return self.body_wrench(self.policy.step(self.zeta, dt) + self.station.model.u_trim)
 
     def body_wrench(self, u: Array) -> Array:

@@ -27,7 +27,7 @@ import xarray as xr
 from casadi import DM, SX
 
 from ...offline import Trajectory
-from ...offline.direct import Stage, against_known
+from ...offline.direct import Stage, against_known, by_turns
 from ...offline.responses import Clairvoyant, ClairvoyantSolver, Policy
 from ...online import build_disturbance
 from ...online.records import versions
@@ -157,8 +157,10 @@ def clairvoyant(scenario: Scenario) -> tuple[Clairvoyant, SelfCheck]:
         station.model.compiled and source.steady
     )  # what is not has too many numbers for one solve
     solver = ClairvoyantSolver(stage, station.game.R, horizon, source.breaks, compiled=compiled)
-    plant, zeta0 = HeldPlant(station, source, vehicle=vehicle), scenario.initial_state
-    found = solver.solve(zeta0, _policies(plant))
+    plant = HeldPlant(station, source, vehicle=vehicle)
+    starts = station.problem.starts(scenario.initial_state)
+    turns = by_turns(starts, lambda start: (solver.solve(start, _policies(plant)), start))
+    found, zeta0 = min(turns, key=lambda turn: turn[0].value)
     return found, self_check(plant, zeta0, found.path)
 
 

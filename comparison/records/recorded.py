@@ -118,7 +118,7 @@ def _start(scenario: Scenario, kind: str) -> tuple[Array, str]:
     numbers, _, key = kind.removeprefix(OPTIMAL).partition(GUESSED)
     try:
         problem = scenario.setup().problem
-        return problem.require_state(np.array(json.loads(numbers), dtype=float)), key
+        return problem.initial_state(np.array(json.loads(numbers), dtype=float)), key
     except (ValueError, TypeError):
         raise InputError(f"the record's kind is '{kind}', but must name an initial state") from None
 

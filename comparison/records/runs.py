@@ -214,6 +214,7 @@ def _described(solution: OfflineSolution) -> dict[str, Any]:
         "seconds": direct.seconds,
         "certified_seconds": solution.seconds,
         "faults": "; ".join(solution.faults),
+        "turns": json.dumps(list(solution.turns)),
     }
 
 

@@ -63,14 +63,21 @@ def require_one_each(key: str, given: Sequence[float], name: str, n_states: int)
 
 
 def require_start(
-    simulation: SimulationSettings, state: Array, names: Sequence[str], half_widths: ArrayLike
+    simulation: SimulationSettings,
+    state: Array,
+    names: Sequence[str],
+    half_widths: ArrayLike,
+    periods: Sequence[float],
 ) -> None:
     """Raise InputError where a run would end at its start, beyond χ."""
     far = np.abs(state) / np.asarray(half_widths)
     if far.max() > simulation.chi:
+        farthest = int(far.argmax())
+        is_turn = np.isclose(periods[farthest], 2.0 * np.pi)
+        hint = "; angles are in rad" if is_turn else ""
         raise InputError(
-            f"the initial state's {names[int(far.argmax())]} is {far.max():.2f} half-widths of the "
-            f"envelope, but a run ends beyond chi = {simulation.chi:g}; start closer or raise "
+            f"the initial state's {names[farthest]} is {far.max():.2f} half-widths of the envelope, "
+            f"but a run ends beyond chi = {simulation.chi:g}{hint}; start closer or raise "
             "simulation.chi"
         )
 

@@ -8,25 +8,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from ...offline import OfflineSettings
 from ...online import LearnerSettings, SampleSettings, SimulationSettings, load_weights
 from ...online.laws import Critic
-from ...symbolic import (
-    InputError,
-    Model,
-    Setup,
-    StationKeeping,
-    Vehicle,
-    find_function,
-    require_vehicle_state,
-)
+from ...symbolic import InputError, Model, Setup, StationKeeping, Vehicle, find_function
 from ...symbolic.arrays import Array, Vector3
+from ...symbolic.game import require_numbers
 from ...symbolic.pyfile import file_content
 from ...symbolic.toml import Settings, shipped_names, validate
-from ...symbolic.underwater import STATE_NAMES
+from ...symbolic.underwater import ANGLES, STATE_NAMES, vehicle_initial_state
 from ...symbolic.value import BasisFunction
 from .building import file_in, find_problem, named_in, problem_setup, vehicle_problem, vehicle_setup
 from .defaults import problem_defaults
@@ -253,9 +245,10 @@ class Scenario(Settings):
 
     @property
     def initial_state(self) -> Array:
-        """ζ(0), (n,): the settings', or half of the envelope's half-widths."""
-        given = self.simulation.initial_state
-        return 0.5 * self._setup.envelope if given is None else np.array(given)
+        """ζ(0), (n,): the settings', or half of the envelope's half-widths; angles the short way."""
+        problem, given = self._setup.problem, self.simulation.initial_state
+        state = 0.5 * self._setup.envelope if given is None else given
+        return problem.angles.start(require_numbers(state, problem.state_names))
 
     @cached_property
     def _setup(self) -> Setup:
@@ -275,13 +268,13 @@ class Scenario(Settings):
             widths = self.envelope.half_widths or ()
             for key, numbers in (("simulation.initial_state", given), ("envelope.half_widths", widths)):
                 require_one_each(key, numbers, f"vehicle '{self.vehicle}'", len(STATE_NAMES))
-            state = require_vehicle_state(given)
-            require_start(self.simulation, state, STATE_NAMES, widths)
+            state = vehicle_initial_state(given)
+            require_start(self.simulation, state, STATE_NAMES, widths, ANGLES.periods)
             require_level(self.simulation, float(state[4]))
         else:
             problem = self._setup.problem
-            state = problem.require_state(given)
-            require_start(self.simulation, state, problem.state_names, problem.scale)
+            state, periods = problem.initial_state(given), problem.angles.periods
+            require_start(self.simulation, state, problem.state_names, problem.scale, periods)
 
     def _load_vehicle(self, name: str) -> Vehicle:
         if name in self._files.vehicles:

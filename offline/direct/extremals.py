@@ -4,13 +4,15 @@ First-order conditions hold at every extremal, and a symmetric start stays on a 
 heave the straight way home can be stationary with a conjugate point, while two mirror images beside it
 are cheaper, since quadratic drag along each axis rewards diagonal motion. The lowest minimum found is
 the value. Two of the same value make it a kink: V is the lower envelope of both, directionally
-differentiable with the smaller slope, and either costate is an optimal one.
+differentiable with the smaller slope, and either costate is an optimal one. Near half a turn of an
+angle the two turns home are two candidates, too.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -18,6 +20,28 @@ from ...symbolic import RunError
 from ...symbolic.arrays import Array
 from ..path import Trajectory
 from .direct import DirectSolution, DirectSolver
+
+T = TypeVar("T")
+
+
+def by_turns(starts: Sequence[Array], solve: Callable[[Array], T]) -> list[T]:
+    """Return what is found from each way to write a state, `Problem.starts`, those that fail left out.
+
+    Raises
+    ------
+    RunError
+        That of the first, if all of them fail.
+    """
+    found: list[T] = []
+    failures: list[RunError] = []
+    for start in starts:
+        try:
+            found.append(solve(start))
+        except RunError as failure:
+            failures.append(failure)
+    if not found:
+        raise failures[0]
+    return found
 
 
 def find_extremals(

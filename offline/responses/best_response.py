@@ -109,6 +109,7 @@ class BestResponse:
             If a response does not converge from any start, or the path has a conjugate point.
         """
         started, zeta0 = time.perf_counter(), self.problem.require_state(zeta0)
+        zeta0 = self.problem.angles.beside(zeta0, path.states[0])  # by the turn of the path
         first, second = self._players(path.degree)
         mesh = self._mesh(value, path)
         times = first.times(mesh)

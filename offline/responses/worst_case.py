@@ -186,7 +186,7 @@ def worst_case(problem: Problem, zeta0: ArrayLike, u_control: SX | None = None) 
     Parameters
     ----------
     problem : the game on its plant, γ finite
-    zeta0 : (n,) initial state
+    zeta0 : (n,) initial state; its angles are taken the short way
     u_control : (k,) expression of the problem's ζ; None for the linear H-infinity policy
 
     Raises
@@ -195,7 +195,7 @@ def worst_case(problem: Problem, zeta0: ArrayLike, u_control: SX | None = None) 
         If the policy is none, or the state is not n finite numbers inside the domain.
     """
     policy = linear_policy(problem) if u_control is None else u_control
-    return WorstCaseSolver(ControlPolicy(problem, policy)).solve(problem.require_state(zeta0))
+    return WorstCaseSolver(ControlPolicy(problem, policy)).solve(problem.initial_state(zeta0))
 
 
 def measured(

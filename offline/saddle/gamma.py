@@ -111,19 +111,28 @@ class GammaCurveSolver:
     def solve(self, zeta0: Array) -> GammaCurve:
         """Return the curve from `zeta0`; a level without saddle point is a fault of its point.
 
+        Near half a turn each point is that of the cheaper turn; see `Angles`.
+
         Raises
         ------
         InputError
             If the state is not n finite numbers inside the domain.
         """
-        zeta0 = self.problem.require_state(zeta0)
+        starts = self.problem.starts(zeta0)
+        curves = [self._from(start) for start in starts]
+        points, limits = (list(each) for each in zip(*curves, strict=True))
+        least = [min(turns, key=_value) for turns in zip(*points, strict=True)]
+        return GammaCurve(starts[0], self.problem.gamma_star, least, min(limits, key=_value))
+
+    def _from(self, zeta0: Array) -> tuple[list[GammaPoint], GammaPoint]:
+        """Return the points from one way to write a state, γ ascending, and their limit."""
         undisturbed, start = self._point(self._undisturbed, zeta0, None)
         points = []
         for solver in reversed(self._solvers):
             point, found = self._point(solver, zeta0, start)
             points.append(point)
             start = found or start
-        return GammaCurve(zeta0, self.problem.gamma_star, points[::-1], undisturbed)
+        return points[::-1], undisturbed
 
     def _point(
         self, solver: SaddleSolver, zeta0: Array, start: SaddleSolution | None
@@ -136,6 +145,11 @@ class GammaCurveSolver:
         except RunError as error:
             return GammaPoint(gamma, np.nan, linear, np.nan, str(error)), None
         return GammaPoint(gamma, solution.value, linear, solution.slope), solution
+
+
+def _value(point: GammaPoint) -> float:
+    """Return what points of several turns are compared by: the value, infinite where there is none."""
+    return float(np.inf if point.fault else point.value)
 
 
 def default_gammas(problem: Problem) -> list[float]:
@@ -165,4 +179,4 @@ def gamma_curve(
         As `GammaCurveSolver` and its `solve`.
     """
     horizon = horizon_of(problem, OfflineSettings() if settings is None else settings)
-    return GammaCurveSolver(problem, gammas, horizon=horizon).solve(problem.require_state(zeta0))
+    return GammaCurveSolver(problem, gammas, horizon=horizon).solve(problem.initial_state(zeta0))

@@ -17,6 +17,7 @@ from .history import History
 from .plant import PlantState
 from .policy import LearnedPolicy, LearnerScenario, fixed_points
 from .settings import RunSettings
+from .turns import by_its_turn
 
 Progress = Callable[[float], None]
 P = TypeVar("P", contravariant=True)
@@ -117,6 +118,7 @@ class _Loop(Generic[P]):
         answer = system.answer(None)
         for i in range(n_steps + 1):
             self.t = i * period
+            system.state = by_its_turn(self.history, system.state, self.t)
             reason = system.outside()
             if reason:
                 self.history.stopped = f"{reason} at t = {self.t:.2f} s"

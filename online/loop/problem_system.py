@@ -50,7 +50,7 @@ class ProblemSystem(System[Policy]):
             )
         self.problem, self.settings = problem, settings
         self.history = History(problem)
-        self.state = PlantState(problem.require_state(settings.initial_state), 0.0, 0.0)
+        self.state = PlantState(problem.initial_state(settings.initial_state), 0.0, 0.0)
         self._disturbance = disturbance
         self._plant = ProblemPlant(problem, settings.tolerance, compiled=compiled)
         self._still = np.zeros(len(problem.game.W_d))

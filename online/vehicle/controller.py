@@ -8,14 +8,22 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...symbolic import InputError, StationKeeping, require_pitch
+from ...symbolic import InputError, StationKeeping
 from ...symbolic.arrays import Array
+from ...symbolic.game import AngleTracker
+from ...symbolic.underwater import require_pitch_within
 from ..learning import Learner, LearnerStep
 from ..loop import LearnedPolicy, LearnerScenario
+from .settings import SimulationSettings
 
 
 class ControllerScenario(LearnerScenario, Protocol):
     """What a controller needs of a scenario."""
+
+    @property
+    def simulation(self) -> SimulationSettings:
+        """Settings of a run, whose pitch limit the controller keeps to."""
+        ...
 
     def station_keeping(self) -> StationKeeping:
         """Return vehicle, game and basis."""
@@ -24,6 +32,9 @@ class ControllerScenario(LearnerScenario, Protocol):
 
 class Controller:
     """Hold a vehicle at a station and learn to do it better.
+
+    An attitude is one thing however it is written: the first measurement is taken the short way from
+    the station, further ones as they continue it (`AngleTracker`).
 
     Parameters
     ----------
@@ -36,6 +47,7 @@ class Controller:
     Attributes
     ----------
     learned : the learner's policy in the station's frame
+    pitch_limit : of the pitch up to which it holds the vehicle [deg], `simulation.pitch_limit`
 
     Examples
     --------
@@ -66,6 +78,8 @@ class Controller:
             )
         self.learned = LearnedPolicy(scenario, learn=learn)
         self._J = np.eye(6)
+        self.pitch_limit = scenario.simulation.pitch_limit
+        self._angles = AngleTracker(self.setup.problem.angles)
 
     @property
     def learner(self) -> Learner:
@@ -106,7 +120,7 @@ class Controller:
         Raises
         ------
         InputError
-            If the measurement is not finite or of the wrong shape, or |pitch| >= 90 degrees.
+            If the measurement is not finite or of the wrong shape, or the pitch is beyond its limit.
         """
         try:
             pose, rate = np.asarray(eta, dtype=float), np.asarray(eta_dot, dtype=float)
@@ -121,8 +135,8 @@ class Controller:
         measured = np.concatenate((pose, rate))
         if not np.isfinite(measured).all():
             raise InputError("eta and eta_dot must be finite, but contain NaN or infinity")
-        require_pitch(pose[4])
         zeta = self._error(measured)
+        require_pitch_within(float(zeta[4]), self.pitch_limit)
         (self._J,) = self.setup.model.kinematics(zeta[:6])
         u_control = self.learned.step(zeta, dt)
         return self.body_wrench(u_control + self.setup.model.u_trim)
@@ -137,5 +151,5 @@ class Controller:
         The dynamics don't depend on where north is, so the learned policy holds at every heading.
         """
         zeta: Array = self._turn @ (measured - self._origin)
-        zeta[5] = math.atan2(math.sin(zeta[5]), math.cos(zeta[5]))
-        return zeta
+        zeta[5] = math.atan2(math.sin(zeta[5]), math.cos(zeta[5]))  # with the rounding of all records
+        return self._angles.enter(zeta)

@@ -25,11 +25,6 @@ class RunScenario(ControllerScenario, LearnerScenario, Protocol):
     """What a run needs of a scenario."""
 
     @property
-    def simulation(self) -> SimulationSettings:
-        """Settings of the run."""
-        ...
-
-    @property
     def initial_state(self) -> Array:
         """ζ(0), (12,)."""
         ...

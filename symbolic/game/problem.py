@@ -13,22 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Array
 from ..errors import GammaTooSmallError, InputError
 from . import riccati
+from .angles import Angles, Equivalence
+from .checks import InverseDynamics, require_inverse, require_periodic
 from .domain import Bound, margins_and_shown, outside, require_numbers
 from .game import Game
-
-
-@dataclass(frozen=True, eq=False)
-class InverseDynamics:
-    """The input that gives a fully actuated plant a wanted acceleration.
-
-    Attributes
-    ----------
-    acceleration : (k,) symbol a = η_ddot
-    v : (k,) expression of ζ = (η, η_dot) and a with f(ζ) + g(ζ) v = (η_dot, a)
-    """
-
-    acceleration: SX
-    v: SX
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +37,14 @@ class Problem:
     domain : bounds outside of which the equations have no meaning
     switching : (s,) expressions of `zeta`; f is only C^1 where one of them changes sign
     inverse_dynamics : for ζ = (η, η_dot) with as many inputs as η has entries; None if there is none
+    periods : of the states that are angles, 0 for the others; no state is an angle if left out
+    equivalence : a second way to write a state beside whole turns; None if there is none
 
     Raises
     ------
     InputError
         If the shapes disagree, f(0) is not 0, the scale is not positive, the origin is not in the
-        domain, or the inverse dynamics contradict f and g.
+        domain, the inverse dynamics contradict f and g, or these have not the periods.
     """
 
     name: str
@@ -71,6 +61,8 @@ class Problem:
     domain: tuple[Bound, ...] = ()
     switching: SX = field(default_factory=lambda: SX(0, 1))
     inverse_dynamics: InverseDynamics | None = None
+    periods: tuple[float, ...] = ()
+    equivalence: Equivalence | None = None
 
     def __post_init__(self) -> None:
         n, k = self.n_states, self.n_inputs
@@ -97,7 +89,11 @@ class Problem:
             )
         self.require_state(np.zeros(n))
         if self.inverse_dynamics is not None:
-            self._require_inverse(self.inverse_dynamics)
+            f, g = self.drift, self.control_matrix
+            require_inverse(self.name, self.zeta, f, g, self.inverse_dynamics, self.scale)
+        if self.periods:
+            terms = casadi.horzcat(self.drift, self.control_matrix, self.disturbance_matrix)
+            require_periodic(self.name, self.zeta, terms, self.scale, self.state_names, self.periods)
 
     @property
     def n_states(self) -> int:
@@ -145,6 +141,26 @@ class Problem:
             raise InputError(fault)
         return state
 
+    def initial_state(self, zeta: ArrayLike) -> Array:
+        """Return a state that enters, its angles written the short way; raises as `require_state`.
+
+        Also InputError for an angle of more turns than anybody writes, which is probably in degrees.
+        """
+        state = require_numbers(zeta, self.state_names)
+        self.angles.require_near(state, self.state_names, self.state_units)
+        return self.require_state(self.angles.start(state))
+
+    def starts(self, zeta: ArrayLike) -> list[Array]:
+        """Return ζ (n,) by each turn from which V* may be least, the short way first.
+
+        Raises as `require_state`, with the angles written the short way.
+        """
+        first = self.require_state(self.angles.start(require_numbers(zeta, self.state_names)))
+        if not self.periods:
+            return [first]
+        others = self.angles.candidates(first, self.P)[1:]
+        return [first, *(other for other in others if self.outside(other) is None)]
+
     def outside(self, zeta: Array) -> str | None:
         """Return the sentence of a bound of the domain that ζ (n,) does not keep, or None."""
         return outside(self.domain, self._domain, zeta) if self.domain else None
@@ -153,6 +169,11 @@ class Problem:
     def margins(self) -> SX:
         """The margins of the domain as one column, (b,), all positive inside."""
         return casadi.vertcat(*(bound.margin for bound in self.domain))
+
+    @cached_property
+    def angles(self) -> Angles:
+        """Which states are angles, and how a state is written."""
+        return Angles(self.periods or (0.0,) * self.n_states, self.equivalence)
 
     @cached_property
     def _domain(self) -> casadi.Function:
@@ -220,6 +241,8 @@ class Problem:
             domain=(),
             switching=SX(0, 1),
             inverse_dynamics=self._linear_inverse(A, B),
+            periods=(),
+            equivalence=None,
         )
 
     def with_game(self, game: Game) -> Problem:
@@ -241,27 +264,6 @@ class Problem:
         a, k = self.inverse_dynamics.acceleration, self.n_inputs
         inverse = np.linalg.inv(B[k:])
         return InverseDynamics(a, DM(inverse) @ (a - DM(A[k:]) @ self.zeta))
-
-    def _require_inverse(self, inverse: InverseDynamics) -> None:
-        """Compare f + g v with (η_dot, a) at seeded points of the scale."""
-        n, k = self.n_states, self.n_inputs
-        if n != 2 * k:
-            raise InputError(f"{self.name}: inverse dynamics need 2 k states, but {n} is not 2 x {k}")
-        wanted = casadi.vertcat(self.zeta[k:], inverse.acceleration)
-        residual = casadi.Function(
-            "residual",
-            [self.zeta, inverse.acceleration],
-            [self.drift + self.control_matrix @ inverse.v - wanted],
-        )
-        rng = np.random.default_rng(0)
-        worst = 0.0
-        for _ in range(3):
-            at = residual(rng.uniform(-0.5, 0.5, n) * self.scale, rng.uniform(-1, 1, k))
-            worst = max(worst, float(np.abs(np.array(DM(at))).max()))
-        if not worst < 1e-9:
-            raise InputError(
-                f"{self.name}: the inverse dynamics contradict f and g by {worst:.2g}; correct them"
-            )
 
     def _name(self, what: str, letter: str, number: int) -> None:
         """Fill in names and units that were left out; raises InputError if there are too few."""

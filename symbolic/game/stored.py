@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import casadi
@@ -12,9 +13,11 @@ from casadi import SX
 from ..arrays import Array
 from ..errors import InputError
 from ..expressions import from_data, to_data
+from .angles import Equivalence
+from .checks import InverseDynamics
 from .domain import Bound
 from .game import Game
-from .problem import InverseDynamics, Problem
+from .problem import Problem
 
 NAMES = ("state_names", "state_units", "input_names", "input_units")
 
@@ -44,7 +47,7 @@ def problem_to_data(problem: Problem) -> dict[str, Any]:
         "game": weights | {"gamma": game.gamma if np.isfinite(game.gamma) else None},
         "domain": [bound.sentence for bound in problem.domain],
         "equations": to_data(equations),
-    }
+    } | _angles_to_data(problem)
 
 
 def problem_from_data(data: Mapping[str, Any]) -> Problem:
@@ -81,10 +84,29 @@ def problem_from_data(data: Mapping[str, Any]) -> Problem:
             domain=domain,
             switching=parts["switching"],
             inverse_dynamics=inverse,
-            **{name: tuple(map(str, data[name])) for name in NAMES},
+            **_names_and_angles(data),
         )
     except (KeyError, TypeError, IndexError) as error:
         raise InputError(f"these are not the data of a problem ({error!r}); make them again") from None
+
+
+def _angles_to_data(problem: Problem) -> dict[str, Any]:
+    """Return what a problem says of its angles; nothing where it has none."""
+    said: dict[str, Any] = {"periods": list(problem.periods)} if problem.periods else {}
+    if problem.equivalence is not None:
+        said["equivalence"] = asdict(problem.equivalence)
+    return said
+
+
+def _names_and_angles(data: Mapping[str, Any]) -> dict[str, Any]:
+    said: dict[str, Any] = {name: tuple(map(str, data[name])) for name in NAMES}
+    said["periods"] = tuple(_matrix(data.get("periods", [])).ravel().tolist())
+    if "equivalence" in data:
+        second = data["equivalence"]
+        signs, shift = (tuple(_matrix(second[name]).ravel().tolist()) for name in ("signs", "shift"))
+        limit = float(_matrix(second["limit"]))
+        said["equivalence"] = Equivalence(int(second["state"]), limit, signs, shift)
+    return said
 
 
 def _matrix(values: Any) -> Array:

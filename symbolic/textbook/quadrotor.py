@@ -88,4 +88,5 @@ def quadrotor(mass: float = MASS, inertia: float = INERTIA, gamma: float = 2.0) 
         input_names=("thrust", "moment"),
         input_units=("N", "N m"),
         domain=(upright,),
+        periods=(0.0, 0.0, 2.0 * np.pi, 0.0, 0.0, 0.0),
     )

@@ -2,11 +2,21 @@
 
 from .dynamics import acceleration, earth_frame, inverse_dynamics
 from .kinematics import jacobian, jacobian_inverse
-from .model import FORCE_NAMES, STATE_NAMES, Model, require_pitch, require_vehicle_state
+from .model import (
+    ANGLES,
+    FORCE_NAMES,
+    STATE_NAMES,
+    Model,
+    require_pitch,
+    require_pitch_within,
+    require_vehicle_state,
+    vehicle_initial_state,
+)
 from .station import StationKeeping
 from .vehicle import Thrusters, Vehicle
 
 __all__ = [
+    "ANGLES",
     "FORCE_NAMES",
     "STATE_NAMES",
     "Model",
@@ -19,5 +29,7 @@ __all__ = [
     "jacobian",
     "jacobian_inverse",
     "require_pitch",
+    "require_pitch_within",
     "require_vehicle_state",
+    "vehicle_initial_state",
 ]

@@ -7,7 +7,20 @@ in the body frame. J is singular at θ = ±π/2 (Assumption 1 keeps the pitch aw
 from __future__ import annotations
 
 import casadi
+import numpy as np
 from casadi import SX
+
+from ..game import Equivalence
+
+_TURN, _SIX = 2.0 * np.pi, (0.0,) * 6
+PERIODS = (*(0.0,) * 3, *(_TURN,) * 3, *_SIX)  # of the states (η, η_dot) [rad], 0 where one is no angle
+# (φ, θ, ψ) and (φ + π, π - θ, ψ + π) are one attitude; the one with |θ| <= π/2 is used
+SAME_ATTITUDE = Equivalence(
+    state=4,
+    limit=np.pi / 2,
+    signs=(*(1.0,) * 4, -1.0, *(1.0,) * 5, -1.0, 1.0),
+    shift=(*(0.0,) * 3, *(np.pi,) * 3, *_SIX),
+)
 
 
 def skew(a: SX) -> SX:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, Vector3
 from ..compiled import Export, Kernel, dense_function, export
 from ..errors import InputError
-from ..game import Bound, Game, InverseDynamics, Problem, require_numbers
+from ..game import Angles, Bound, Game, InverseDynamics, Problem, require_numbers
 from . import dynamics, kinematics
 from .vehicle import Vehicle
 
@@ -29,6 +29,7 @@ PITCH_SENTENCE = (
     "(Assumption 1); start closer to level"
 )
 PITCH_LIMIT = np.pi / 2  # rad; J is singular there (Assumption 1)
+ANGLES = Angles(kinematics.PERIODS, kinematics.SAME_ATTITUDE)
 
 
 class Model:
@@ -115,6 +116,8 @@ class Model:
             domain=(pitch_bound(self.zeta),),
             switching=dynamics.relative_velocity(self.zeta, self.current),
             inverse_dynamics=InverseDynamics(a, v),
+            periods=kinematics.PERIODS,
+            equivalence=kinematics.SAME_ATTITUDE,
         )
 
     @cached_property
@@ -199,6 +202,17 @@ def require_pitch(theta: float) -> None:
         raise InputError(PITCH_SENTENCE.format(f"{np.degrees(theta):.1f}"))
 
 
+def require_pitch_within(theta: float, limit: float) -> None:
+    """Raise InputError where the pitch [rad] is beyond the limit [deg] of what is held."""
+    if abs(np.degrees(theta)) > limit:
+        raise InputError(
+            f"the pitch is {np.degrees(theta):.1f} deg, but the controller holds a vehicle within "
+            f"±{limit:g} deg: towards ±90 deg the Euler angles get singular (Assumption 1), and its "
+            "forces grow without bound; bring the vehicle closer to level, or raise "
+            "simulation.pitch_limit"
+        )
+
+
 def pitch_bound(zeta: SX) -> Bound:
     """Return the bound of the pitch of a vehicle's state, (π/2)^2 - θ^2 > 0."""
     return Bound(PITCH_LIMIT**2 - zeta[4] ** 2, PITCH_SENTENCE, 180.0 / np.pi * zeta[4])
@@ -215,3 +229,16 @@ def require_vehicle_state(zeta: ArrayLike) -> Array:
     state = require_numbers(zeta, STATE_NAMES)
     require_pitch(float(state[4]))
     return state
+
+
+def vehicle_initial_state(zeta: ArrayLike) -> Array:
+    """Return a vehicle's state that enters, its attitude written the short way.
+
+    Raises
+    ------
+    InputError
+        As `require_vehicle_state`, or for an angle of many turns, which is probably in degrees.
+    """
+    state = require_numbers(zeta, STATE_NAMES)
+    ANGLES.require_near(state, STATE_NAMES, STATE_UNITS)
+    return require_vehicle_state(ANGLES.start(state))
