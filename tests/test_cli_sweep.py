@@ -108,7 +108,7 @@ def test_a_longer_sweep_keeps_what_a_shorter_one_made(user_folder: Path, capsys:
 
 
 def test_runs_that_fail_are_rows_with_their_reason(user_folder: Path, capsys: Capture) -> None:
-    """γ below its bound, a vehicle that is lost, a step too long to be stable; the rest goes on."""
+    """γ below its bound, a period too long to hold the game; the rest goes on."""
     words = ("--vary", "game.gamma=0.9,2", "--vary", "simulation.control_period=0.02,1.0")
     words += tuple(sets("simulation.duration=4"))
     answer = call(capsys, *WORDS, *words)
@@ -123,13 +123,13 @@ def test_runs_that_fail_are_rows_with_their_reason(user_folder: Path, capsys: Ca
     assert [row["failed"] for row in rows[4:6]] == ["False"] * 2
     for row in rows[6:]:
         assert row["failed"] == "True", row
-        assert "at t = " in row["reason"]
-        assert load(user_folder / "out" / row["record"]).attrs["stopped"] == row["reason"]
+        assert "a control period of 1 s can't hold this game" in row["reason"]
+        assert row["cost"] == row["record"] == ""
     assert told["failed"] == 6
     for group in told["summary"]:
         regret = group["regret"]
         assert (regret["median"] is None) == ("note" in regret) == (group["failed"] > 0), group
-        assert regret["diverged"] == (group["failed"] if group["settings"]["game.gamma"] > 1 else 0)
+        assert regret["diverged"] == 0  # of what never started there is no optimum either
     again = call(capsys, *WORDS, *words)
     assert (again.code, again.json()["resumed"]) == (1, 8), "they would fail so again"
 
