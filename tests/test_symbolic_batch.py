@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import casadi
 import numpy as np
 import pytest
@@ -42,6 +44,15 @@ def test_a_rolled_step_integrates(compiled: bool) -> None:
     exact = solve_ivp(lambda t, z: [z[1], -np.sin(z[0])], (0, 2), [1.0, 0.0], rtol=1e-11, atol=1e-12)
     assert path.shape == (2001, 2)
     np.testing.assert_allclose(path[-1], exact.y[:, -1], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["step", "advance", "square"])
+def test_a_name_of_the_c_library_is_not_taken_for_it(name: str) -> None:
+    """Where a compiler exists the compiled loop agrees with the virtual machine and is in use."""
+    x = SX.sym("x", 2)
+    kernel = BatchKernel(dense_function(name, {"x": x}, {"y": x**2}))
+    np.testing.assert_allclose(kernel(np.full((3, 2), 3.0))[0], np.full((3, 2), 9.0))
+    assert (kernel._loop is None) != any(map(shutil.which, ("cc", "gcc", "clang")))
 
 
 def test_wrong_shapes_are_refused(compiled: bool) -> None:

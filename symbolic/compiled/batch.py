@@ -13,7 +13,7 @@ import casadi
 import numpy as np
 
 from ..arrays import Array
-from .compilation import CompilationError, compile_function
+from .compilation import FLAGS, CompilationError, c_source, compile_source
 from .kernel import TOLERANCE, WITHOUT_COMPILER, Kernel, say_once
 
 _LOOP = """
@@ -89,7 +89,10 @@ class BatchKernel:
 
     def _compile(self) -> ctypes._NamedFuncPointer | None:
         try:
-            library = compile_function(self.function, self._wrapper())
+            # a name of its own: the C library has functions called `step` or `advance`, which the call
+            # inside `batch` would be bound to
+            renamed = f"#define {self.function.name()} stationkeep_{self.function.name()}\n"
+            library = compile_source(renamed + c_source(self.function) + self._wrapper(), FLAGS)
             try:
                 loop = ctypes.CDLL(str(library.path)).batch
             except (OSError, AttributeError):

@@ -103,13 +103,12 @@ def _target(path: str) -> str:
     return "\n".join(sorted(answer.stdout.splitlines()))
 
 
-def compile_function(function: casadi.Function, wrapper: str = "") -> Library:
+def compile_function(function: casadi.Function) -> Library:
     """Return the compiled library of a function, from the cache or newly built.
 
-    `wrapper` is C code that is appended to the generated code and may call it. Raises as
-    `compile_source`.
+    Raises as `compile_source`.
     """
-    return compile_source(c_source(function) + wrapper, FLAGS)
+    return compile_source(c_source(function), FLAGS)
 
 
 def compile_source(source: str, flags: tuple[str, ...]) -> Library:
