@@ -24,6 +24,28 @@ JARGON = (
     "instance of",
 )
 
+# Files that take more than five seconds of processor time, the longest first: processes that share the
+# files begin with these, so that none of them is begun when all others are done.
+LONGEST_FIRST = (
+    *("test_cli_compare", "test_docs", "test_comparison_replay", "test_cli_many_states"),
+    *("test_comparison_compare", "test_cli_sweep_faults", "test_cli_sweep", "test_cli_interrupt"),
+    *("test_cli_bad_folders", "test_cli_json", "test_examples", "test_comparison_optima"),
+    *("test_comparison_scenario", "test_online_record", "test_offline_certificate"),
+    *("test_comparison_ideal", "test_cli_gamma", "test_offline_extremals"),
+    *("test_symbolic_compilation", "test_comparison_clairvoyant", "test_cli_records"),
+    *("test_platforms", "test_main_guard", "test_online_memory", "test_comparison_records"),
+    *("test_cli_bad_files", "test_cli_help", "test_comparison_regret", "test_comparison_problem"),
+    *("test_comparison_uub", "test_offline_worst_case", "test_comparison_pool"),
+    *("test_offline_clairvoyant", "test_offline_saddle", "test_comparison_sweep_table"),
+    *("test_comparison_theory", "test_benchmarks", "test_online_closed_loop"),
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files of `LONGEST_FIRST` first; the order within a file stays."""
+    rank = {name: place for place, name in enumerate(LONGEST_FIRST)}
+    items.sort(key=lambda item: rank.get(item.path.stem, len(rank)))
+
 
 @pytest.fixture(scope="session", autouse=True)
 def isolated_environment(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:

@@ -147,7 +147,8 @@ def _setting(group: type[BaseModel], parts: list[str]) -> bool:
 
 def program(page: list[Block], *, slow: bool) -> str:
     """Return a page as one program; without what is slow unless it is asked for."""
-    lines = ["import subprocess, sys", "from pathlib import Path", "sys.path.insert(0, '.')"]
+    lines = ["import sys", "from pathlib import Path", "from stationkeep.cli.main import main"]
+    lines.append("sys.path.insert(0, '.')")
     for mark, language, text in page:
         if mark == "slow" and not slow:
             continue
@@ -160,6 +161,5 @@ def program(page: list[Block], *, slow: bool) -> str:
             lines.append(text)
         elif language == "sh" and mark in ("run", "slow"):
             for words in commands(text):
-                call = ["-m", "stationkeep.cli.main", *words]
-                lines.append(f"subprocess.run([sys.executable, *{call!r}], check=True)")
+                lines.append(f"assert main({words!r}) == 0")
     return "\n".join(lines)

@@ -100,7 +100,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small(folder: Path) -> Answer:
-    return run("compare", "--json", "--quiet", "--n-states", "1", *SMALL, cwd=folder)
+    words = ("compare", "--json", "--quiet", "--n-states", "1", "--workers", "1")
+    return run(*words, *SMALL, cwd=folder)
 
 
 def test_small_compare(small: Answer, folder: Path) -> None:

@@ -37,15 +37,17 @@ def started() -> Iterator[list[Started]]:
             sweep.kill()
 
 
-def assert_as_undisturbed(states: int, folder: Path) -> None:
+def assert_as_undisturbed(states: int, folder: Path, capsys: Capture) -> None:
     """The table is that of a sweep in one process that nothing happened to, digit for digit."""
-    answer = Started("undisturbed", "--states", str(states), "--workers", "1").answer()
+    answer = call(capsys, *QUIET, "--out", "undisturbed", "--states", str(states))
     assert answer.code == 0, answer.err
     assert table("out") == table("undisturbed")
     assert not [name for name in files_in(folder) if Path(name).name.startswith(".")]
 
 
-def test_killed_and_resumed_with_a_worker_lost(user_folder: Path, started: list[Started]) -> None:
+def test_killed_and_resumed_with_a_worker_lost(
+    user_folder: Path, capsys: Capture, started: list[Started]
+) -> None:
     first = Started("out", "--states", "6", "--workers", "2")
     started.append(first)
     first.wait_for(2)
@@ -59,13 +61,13 @@ def test_killed_and_resumed_with_a_worker_lost(user_folder: Path, started: list[
     answer = second.answer()
     assert (answer.code, answer.err) == (0, "")
     assert answer.json()["resumed"] >= kept - 1  # a torn line is a run that was not finished
-    assert_as_undisturbed(6, user_folder)
+    assert_as_undisturbed(6, user_folder, capsys)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_killed_at_random_moments_again_and_again(
-    seed: int, user_folder: Path, started: list[Started]
+    seed: int, user_folder: Path, capsys: Capture, started: list[Started]
 ) -> None:
     rng = np.random.default_rng(seed)
     for kill in range(4):
@@ -79,7 +81,7 @@ def test_killed_at_random_moments_again_and_again(
     last = Started("out", "--states", "16", "--workers", "2")
     started.append(last)
     assert last.answer().code == 0
-    assert_as_undisturbed(16, user_folder)
+    assert_as_undisturbed(16, user_folder, capsys)
 
 
 def test_ctrl_c_leaves_whole_results(user_folder: Path, started: list[Started]) -> None:
@@ -110,7 +112,7 @@ def test_two_sweeps_into_one_folder(user_folder: Path, capsys: Capture) -> None:
 
 
 @pytest.mark.slow
-def test_a_disk_that_fills_up(user_folder: Path) -> None:
+def test_a_disk_that_fills_up(user_folder: Path, capsys: Capture) -> None:
     """A file system of 200 kB: what fitted is kept, and goes on where there is room."""
     (user_folder / "out").mkdir()
     mounted = subprocess.run(
@@ -129,7 +131,7 @@ def test_a_disk_that_fills_up(user_folder: Path) -> None:
         resumed = Started("out", "--states", "6").answer()
         assert resumed.code == 0
         assert resumed.json()["resumed"] == kept
-        assert_as_undisturbed(6, user_folder)
+        assert_as_undisturbed(6, user_folder, capsys)
     finally:
         subprocess.run(["umount", "out"], check=True)
 
@@ -168,7 +170,7 @@ def test_through_a_cluster_with_a_worker_lost_then_the_scheduler(
     last = resumed.answer()
     assert last.code == 0
     assert last.json()["resumed"] >= len(rows)
-    assert_as_undisturbed(30, user_folder)
+    assert_as_undisturbed(30, user_folder, capsys)
 
 
 @pytest.mark.slow

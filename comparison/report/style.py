@@ -100,6 +100,10 @@ class Page:
             self._write(name, sheet)
 
     def _write(self, name: str, sheet: Figure) -> None:
+        engine = sheet.get_layout_engine()
+        assert engine is not None
+        engine.execute(sheet)
+        sheet.set_layout_engine("none")  # or every file would find the layout again
         buffer = io.BytesIO()
         sheet.savefig(buffer, format="png")
         self.pictures[name] = buffer.getvalue()

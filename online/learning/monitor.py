@@ -103,10 +103,7 @@ class Monitor:
 
     @cached_property
     def _terms(self) -> BellmanTerms:
-        """What the points alone decide.
-
-        In blocks: a kernel for all the points takes 0.3 s to build, one for a block 10 ms.
-        """
+        """What the points alone decide; in blocks, so that σ' of all of them is never in memory."""
         blocks = [self._points[i : i + BLOCK] for i in range(0, len(self._points), BLOCK)]
         parts = [terms_at(self._learner.functions, block) for block in blocks]
         return BellmanTerms(

@@ -84,17 +84,14 @@ class ValueFunctions:
         return self._samplers[n_samples]
 
     def at(self, points: Array) -> PointTerms:
-        """Return f, g and σ' at the rows of `points`, shape (N, n).
+        """Return f, g and σ' at the rows of `points`, shape (N, n), from one library for every N."""
+        f, g, sigma_prime = self._at_points(points)
+        n = self.problem.n_states
+        return PointTerms(f, _matrices(g, n), _matrices(sigma_prime, self.basis.n_basis))
 
-        The arrays are views of the kernel's buffers: the next call with as many points overwrites
-        them.
-        """
-        n_points = len(points)
-        kernel = self.sampler(n_points)
-        kernel.inputs[0].T[...] = points
-        kernel.evaluate()
-        f, g, sigma_prime = (_by_point(output, n_points) for output in kernel.outputs)
-        return PointTerms(f[..., 0], g, sigma_prime)
+    @cached_property
+    def _at_points(self) -> BatchKernel:
+        return BatchKernel(self._point_function(), compiled=self.compiled)
 
     @cached_property
     def term_layout(self) -> TermLayout:
@@ -130,6 +127,7 @@ class ValueFunctions:
         for name in ("sigma", "sigma_prime", "policies"):
             getattr(self, name)
             yield self._exports[name]
+        self._at_points  # noqa: B018 - compiled with the others, though it has no row of its own
         self.sampler(n_samples)
         yield self._exports["sample_kernel"]
 
@@ -157,9 +155,6 @@ class ValueFunctions:
         return kernel
 
 
-def _by_point(output: Array, n_points: int) -> Array:
-    """Return a (rows, columns N) column-major result as (N, rows, columns) without a copy."""
-    rows = output.shape[0]
-    columns = output.size // (rows * n_points)
-    flat = output.ravel(order="K")
-    return flat.reshape(n_points, columns, rows).transpose(0, 2, 1)
+def _matrices(entries: Array, rows: int) -> Array:
+    """Return (N, entries of a column-major matrix) as (N, rows, columns) without a copy."""
+    return entries.reshape(len(entries), -1, rows).transpose(0, 2, 1)
