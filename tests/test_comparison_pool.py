@@ -24,7 +24,8 @@ from stationkeep.symbolic import InputError, RunError
 def setup(folder):
     with open(folder + "/built", "a") as file:
         file.write(f"{os.getpid()}\\n")
-    if signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, []):
+    blocked = signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    if not blocked and signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         Path(folder, f"hears-{os.getpid()}").touch()
 
     def work(task):

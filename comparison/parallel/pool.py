@@ -23,6 +23,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Generic, TypeVar
 
 from ...symbolic import InputError, RunError, StationkeepError
+from .guard import NO_GUARD, WORKER, no_guard, refuse_in_worker
 
 S = TypeVar("S")  # what is shipped to every worker
 T = TypeVar("T")  # a task
@@ -31,6 +32,7 @@ M = TypeVar("M")  # what a task says of its progress
 Work = Callable[[T], Iterator[M]]
 ATTEMPTS = 2
 _SPAWN = multiprocessing.get_context("spawn")
+_HAS_MASKS = hasattr(signal, "pthread_sigmask")  # not on Windows
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -75,6 +77,8 @@ def run_tasks(
     ------
     StationkeepError
         What a task or the setup raises of it ends the whole run.
+    InputError
+        If the script that starts workers has no main guard.
     """
     if n_workers <= 1 or len(tasks) <= 1:
         work = setup(shipment)
@@ -82,6 +86,7 @@ def run_tasks(
             for message in work(task):
                 yield Event(number, message)
         return
+    refuse_in_worker()
     pool = _Pool(setup, shipment, tasks)
     try:
         yield from pool.run(n_workers)
@@ -96,7 +101,7 @@ class _Worker(Generic[S, T, M]):
         self.connection, theirs = _SPAWN.Pipe()
         self.task = -1
         self.process: SpawnProcess = _SPAWN.Process(
-            target=_serve, args=(theirs, setup, shipment), daemon=True
+            target=_serve, name=WORKER, args=(theirs, setup, shipment), daemon=True
         )
         self.process.start()
         theirs.close()
@@ -115,7 +120,13 @@ class _Worker(Generic[S, T, M]):
         self.process.join()
         self.connection.close()
         code = self.process.exitcode or 0
-        return f"was killed ({signal.Signals(-code).name})" if code < 0 else f"ended with code {code}"
+        return f"was killed ({_signal_name(-code)})" if code < 0 else f"ended with code {code}"
+
+
+def _signal_name(number: int) -> str:
+    """Return a signal's name as this platform has it, or its number."""
+    known = {int(one): one.name for one in signal.Signals}
+    return known.get(number, f"signal {number}")
 
 
 class _Pool(Generic[S, T, M]):
@@ -180,6 +191,8 @@ class _Pool(Generic[S, T, M]):
         """Give the task of a dead worker another attempt, or up."""
         del self.busy[worker.connection]
         how = worker.end()
+        if worker.process.exitcode == NO_GUARD:
+            raise no_guard() from None
         if self.attempts[worker.task] < ATTEMPTS:
             self.again.appendleft(worker.task)
         else:
@@ -192,22 +205,36 @@ class _Pool(Generic[S, T, M]):
 def _as_workers_need_it() -> Iterator[None]:
     """Let a process start with one BLAS thread and deaf to Ctrl-C, which is for its parent."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    resource_tracker.ensure_running()  # when it starts, Python 3.11 lets SIGINT through again
-    deaf = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     try:
-        yield
+        with _deaf():
+            yield
     finally:
         for name, value in before.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
-        signal.pthread_sigmask(signal.SIG_SETMASK, deaf)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Block Ctrl-C for what is started meanwhile; a platform without signal masks can't."""
+    if not _HAS_MASKS:
+        yield
+        return
+    resource_tracker.ensure_running()  # when it starts, Python 3.11 lets SIGINT through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _serve(connection: Connection, setup: Callable[[S], Work[T, M]], shipment: S) -> None:
     """Work on the tasks that come through the pipe, in the worker."""
+    if not _HAS_MASKS:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     logging.getLogger("stationkeep").addHandler(logging.NullHandler())  # the parent said it already
     try:
