@@ -47,9 +47,10 @@ class OfflineSettings(Settings):
     hji_tolerance: PositiveFloat = 1e-7
     costate_tolerance: PositiveFloat = 1e-5
 
-    def mesh(self, horizon: float) -> MeshSettings:
-        """Return the first mesh, over a horizon [s]; normally that of `horizon_of`."""
-        return MeshSettings(horizon, self.intervals, self.degree, self.grading)
+    def mesh(self, problem: Problem) -> MeshSettings:
+        """Return the first mesh, over `horizon_of`, with more intervals where the problem is stiff."""
+        asked = MeshSettings(horizon_of(problem, self), self.intervals, self.degree, self.grading)
+        return asked.resolving(problem.fastest_rate)
 
 
 def horizon_of(problem: Problem, settings: OfflineSettings) -> float:

@@ -12,8 +12,15 @@ from numpy.typing import ArrayLike
 from ..symbolic import Problem, RunError
 from ..symbolic.arrays import Array
 from .certificate import Certificate
-from .direct import DirectSolution, DirectSolver, Refined, find_extremals, refine
-from .path import Trajectory, extended, halved
+from .direct import (
+    DirectSolution,
+    DirectSolver,
+    Refined,
+    aligned_extremals,
+    find_extremals,
+    refine,
+)
+from .path import MeshSettings, Trajectory, extended, halved
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings, horizon_of
 
@@ -59,9 +66,7 @@ class OfflineSolver:
         self.problem = problem
         self.settings = OfflineSettings() if settings is None else settings
         self.horizon = horizon_of(problem, self.settings)
-        self.direct = DirectSolver(
-            problem, self.settings.mesh(self.horizon), method=self.settings.method
-        )
+        self.direct = DirectSolver(problem, self.settings.mesh(problem), method=self.settings.method)
 
     def solve(self, zeta0: Array, guess: Trajectory | None = None) -> OfflineSolution:
         """Return the optimum from `zeta0` and its certificate.
@@ -95,12 +100,7 @@ class OfflineSolver:
         """Return the refined cheapest extremal, and the others on aligned meshes."""
         extremals = find_extremals(self.direct, first, starts=self.settings.starts)
         if self.settings.aligned and len(extremals) > 1:
-            # which is cheapest may hang on the error of the first mesh
-            extremals = [
-                self.direct.solve_aligned(first.zeta, guess=each.trajectory, verify=False)[0]
-                for each in extremals
-            ]
-            extremals.sort(key=lambda solution: solution.value)
+            extremals = aligned_extremals(self.direct, first, extremals)
         best = extremals[0]
         refined = refine(self.direct, self.settings, best.zeta, best.trajectory)
         solution = replace(
@@ -187,7 +187,8 @@ class OfflineSolver:
 
     @cached_property
     def _saddle(self) -> SaddleSolver:
-        return SaddleSolver(self.problem, horizon=self.horizon)
+        mesh = MeshSettings.saddle.changed(horizon=self.horizon)
+        return SaddleSolver(self.problem, mesh.resolving(self.problem.fastest_rate))
 
 
 def solve(

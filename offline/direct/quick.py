@@ -19,11 +19,11 @@ class QuickValue:
     Parameters
     ----------
     problem : the game on its plant
-    settings : of the mesh, which sets the error
+    settings : of the mesh, which sets the error; made to suit the closed loop of the problem
     """
 
     def __init__(self, problem: Problem, settings: MeshSettings = MeshSettings.quick) -> None:
-        self._solver = DirectSolver(problem, settings)
+        self._solver = DirectSolver(problem, settings.suited(problem))
         self._last: tuple[bytes, DirectSolution] | None = None
 
     def __call__(self, zeta: Array) -> float:
