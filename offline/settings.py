@@ -9,6 +9,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 
 from ..symbolic import Problem
 from ..symbolic.toml import Settings
+from .limits import Limits
 from .path import MeshSettings
 
 Method = Literal["newton", "ipopt"]
@@ -28,6 +29,8 @@ class OfflineSettings(Settings):
     starts : pairs of continuations that look for other extremals; 0 looks for none
     method : "newton", the structured Newton method where the plant is fully actuated and IPOPT
         elsewhere, or "ipopt" always
+    max_iterations, max_seconds : of a solve, all of its parts together, its certificate too; one that
+        reaches them ends with the reason and what it has [-, s]
     value_tolerance : largest relative value error of a solve that counts as converged
     defect_tolerance : largest gap to the re-integrated trajectory, in half-widths
     hji_tolerance : largest residual of (7), relative to the state cost
@@ -42,10 +45,17 @@ class OfflineSettings(Settings):
     rounds: PositiveInt = 5
     starts: NonNegativeInt = 4
     method: Method = "newton"
+    max_iterations: PositiveInt = 10_000
+    max_seconds: PositiveFloat = 300.0
     value_tolerance: PositiveFloat = 1e-7
     defect_tolerance: PositiveFloat = 1e-6
     hji_tolerance: PositiveFloat = 1e-7
     costate_tolerance: PositiveFloat = 1e-5
+
+    @property
+    def limits(self) -> Limits:
+        """The limits of a solve."""
+        return Limits(self.max_iterations, self.max_seconds)
 
     def mesh(self, problem: Problem) -> MeshSettings:
         """Return the first mesh, over `horizon_of`, with more intervals where the problem is stiff."""

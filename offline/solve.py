@@ -20,6 +20,7 @@ from .direct import (
     find_extremals,
     refine,
 )
+from .limits import LimitError, limited
 from .path import MeshSettings, Trajectory, extended, halved
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings, horizon_of
@@ -36,7 +37,8 @@ class OfflineSolution:
     others : further extremals, the cheapest first, each on its own aligned mesh
     certificate : the error of `direct`
     faults : what breaks the tolerances; empty if the certificate holds
-    rounds : of mesh refinement
+    rounds : of mesh refinement; 0 where it was not finished
+    ended : why the solve ended before its certificate was complete, or nothing
     seconds : wall time, certificate included
     """
 
@@ -46,6 +48,7 @@ class OfflineSolution:
     certificate: Certificate
     faults: list[str]
     rounds: int
+    ended: str
     seconds: float
 
     @property
@@ -72,27 +75,42 @@ class OfflineSolver:
         """Return the optimum from `zeta0` and its certificate.
 
         `guess` is where the first solve starts, instead of the linear H-infinity policy; the other
-        starts of the search for extremals, and the saddle point, don't use it.
+        starts of the search for extremals, and the saddle point, don't use it. A solve that reaches the
+        limits of the settings after it has found an optimum returns that, with what is known of it, and
+        `ended` is the first of its faults.
 
         Raises
         ------
         InputError
             If the state is not n finite numbers inside the domain.
+        EndedByLimitError
+            If the limits are reached before the first optimum is found.
         RunError
             If no solver converges inside the domain.
         """
-        started = time.perf_counter()
-        first = self.direct.solve(zeta0, guess=guess, verify=False)
-        refined, others = self._cheapest(first)
-        saddle = self._saddle_point(refined.solution)
-        certificate = self._certify(refined, others, saddle)
+        started, ended = time.perf_counter(), ""
+        with limited(self.settings.limits) as work:
+            solution = self.direct.solve(zeta0, guess=guess, verify=False)
+            saddle, others, rounds = None, list[DirectSolution](), 0
+            certificate = Certificate.unknown(solution)
+            try:
+                refined, others = self._cheapest(solution)
+                solution, rounds = refined.solution, refined.rounds
+                certificate = Certificate.unknown(solution)
+                saddle = self._saddle_point(solution)
+                certificate = self._certify(refined, others, saddle)
+            except LimitError as limit:
+                if limit.work is not work:
+                    raise
+                ended = str(limit)
         return OfflineSolution(
-            direct=refined.solution,
+            direct=solution,
             saddle=saddle,
             others=others,
             certificate=certificate,
-            faults=certificate.faults(self.settings),
-            rounds=refined.rounds,
+            faults=[ended] * bool(ended) + certificate.faults(self.settings),
+            rounds=rounds,
+            ended=ended,
             seconds=time.perf_counter() - started,
         )
 

@@ -6,8 +6,11 @@ import numpy as np
 
 from ...symbolic import Problem
 from ...symbolic.arrays import Array
+from ..limits import Limits, limited
 from ..path import MeshSettings
 from .direct import DirectSolution, DirectSolver
+
+QUICK = Limits(max_iterations=1000, max_seconds=60.0, name="QuickValue")
 
 
 class QuickValue:
@@ -20,9 +23,16 @@ class QuickValue:
     ----------
     problem : the game on its plant
     settings : of the mesh, which sets the error; made to suit the closed loop of the problem
+    limits : of one solve
     """
 
-    def __init__(self, problem: Problem, settings: MeshSettings = MeshSettings.quick) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        settings: MeshSettings = MeshSettings.quick,
+        limits: Limits = QUICK,
+    ) -> None:
+        self._limits = limits
         self._solver = DirectSolver(problem, settings.suited(problem))
         self._last: tuple[bytes, DirectSolution] | None = None
 
@@ -45,9 +55,10 @@ class QuickValue:
         InputError
             If the state is not n finite numbers inside the domain.
         RunError
-            If the solver does not converge.
+            If the solver does not converge, within its limits.
         """
         key = np.asarray(zeta, dtype=float).tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, self._solver.solve(zeta, verify=False)
+            with limited(self._limits):
+                self._last = key, self._solver.solve(zeta, verify=False)
         return self._last[1]
