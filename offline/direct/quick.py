@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from ...symbolic import Problem
@@ -24,7 +26,13 @@ class QuickValue:
     problem : the game on its plant
     settings : of the mesh, which sets the error; made to suit the closed loop of the problem
     limits : of one solve
+
+    Attributes
+    ----------
+    error : largest relative error of a value, with room
     """
+
+    error: ClassVar[float] = 5e-6
 
     def __init__(
         self,
