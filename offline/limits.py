@@ -61,11 +61,13 @@ class Work:
     limits : that hold
     around : the work that this is a part of, if any
     iterations : so far
+    ended : what the limit said when it was reached, or nothing
     """
 
     limits: Limits
     around: Work | None = None
     iterations: int = 0
+    ended: str = ""
     started: float = field(default_factory=time.monotonic)
 
     @property
@@ -81,11 +83,11 @@ class Work:
         elif self.seconds > limits.max_seconds:
             spent = f"{limits.name}.max_seconds = {limits.max_seconds:g}"
         if spent is not None:
-            raise LimitError(
+            self.ended = (
                 f"the solve was ended after {self.iterations} iterations and {self.seconds:.1f} s by "
-                f"its limit {spent}; raise it to go on",
-                self,
+                f"its limit {spent}, which may be raised"
             )
+            raise LimitError(self.ended, self)
         if self.around is not None:
             self.around.require(more)
 

@@ -40,8 +40,8 @@ def below_optimum(regret: float | None, error: float) -> str | None:
     if regret is None or not regret < -error:
         return None
     return (
-        f"its regret is {regret:.1e}, below zero by more than the error {error:.0e} of optimum and cost: "
-        "one of the two is wrong"
+        f"its regret is {regret:.1e}, below zero by more than the error {error:.0e} of optimum and "
+        "cost: one of the two is wrong"
     )
 
 

@@ -139,12 +139,7 @@ class ClairvoyantSolver:
             If IPOPT converges from no start; the message holds its last status, or the limit.
         """
         with limited(self.limits) as work:
-            found = self._solve(zeta0, policies)
-            try:
-                work.require()
-            except LimitError as limit:
-                return replace(found, ended=str(limit))
-            return found
+            return replace(self._solve(zeta0, policies), ended=work.ended)
 
     def _solve(self, zeta0: Array, policies: Iterable[Policy]) -> Clairvoyant:
         started = time.perf_counter()
