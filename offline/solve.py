@@ -20,7 +20,7 @@ from .direct import (
     find_extremals,
     refine,
 )
-from .limits import LimitError, limited
+from .limits import LimitError, Work, limited
 from .path import MeshSettings, Trajectory, extended, halved
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings, horizon_of
@@ -100,9 +100,7 @@ class OfflineSolver:
                 saddle = self._saddle_point(solution)
                 certificate = self._certify(refined, others, saddle)
             except LimitError as limit:
-                if limit.work is not work:
-                    raise
-                ended = str(limit)
+                ended = _own(limit, work)
         return OfflineSolution(
             direct=solution,
             saddle=saddle,
@@ -207,6 +205,13 @@ class OfflineSolver:
     def _saddle(self) -> SaddleSolver:
         mesh = MeshSettings.saddle.changed(horizon=self.horizon)
         return SaddleSolver(self.problem, mesh.resolving(self.problem.fastest_rate))
+
+
+def _own(limit: LimitError, work: Work) -> str:
+    """Return what a limit of this work says; raises that of another, which this is a part of."""
+    if limit.work is not work:
+        raise limit
+    return str(limit)
 
 
 def solve(
