@@ -21,7 +21,8 @@ class OfflineSettings(Settings):
     Attributes
     ----------
     horizon : [s]; after it the cost is ζ(T)'P ζ(T). None chooses it by the decay of the closed loop
-    intervals : K at the start, before alignment and refinement
+    intervals : K at the start, before alignment and refinement; more for a fast problem, unless it or
+        the grading is chosen
     degree : Radau points an interval at the start
     grading : about the logarithm of the ratio of the last to the first interval; 0 is uniform
     aligned : put mesh points where switching functions change sign, such as the velocities under drag
@@ -58,9 +59,15 @@ class OfflineSettings(Settings):
         return Limits(self.max_iterations, self.max_seconds)
 
     def mesh(self, problem: Problem) -> MeshSettings:
-        """Return the first mesh, over `horizon_of`, with more intervals where the problem is stiff."""
+        """Return the first mesh, over `horizon_of`.
+
+        Where neither intervals nor grading differ from their defaults, they are made to resolve the
+        fastest mode; what is asked for is what the mesh has.
+        """
         asked = MeshSettings(horizon_of(problem, self), self.intervals, self.degree, self.grading)
-        return asked.resolving(problem.fastest_rate)
+        default = MeshSettings.certified
+        chosen = (self.intervals, self.grading) != (default.n_intervals, default.grading)
+        return asked if chosen else asked.resolving(problem.fastest_rate)
 
 
 def horizon_of(problem: Problem, settings: OfflineSettings) -> float:

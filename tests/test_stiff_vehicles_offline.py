@@ -93,6 +93,8 @@ def test_first_meshes_resolve_the_fastest_mode_and_outlast_the_slowest(name: str
     first = OfflineSettings().mesh(problem)
     assert first.points[1] * fastest <= 1.05
     assert first.horizon == horizon_of(problem, OfflineSettings())
+    chosen = OfflineSettings(intervals=7, grading=2.0).mesh(problem)
+    assert (chosen.n_intervals, chosen.grading) == (7, 2.0)
 
 
 @pytest.mark.parametrize("name", ["bluerov2-heavy", "bluerov2-heavy-buoyant", "rexrov"])
