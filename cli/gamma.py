@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from ..offline import GammaCurve, GammaCurveSolver
+from ..offline import GammaCurve, GammaCurveSolver, Limits
 from ..symbolic import InputError, Problem
 from .output import print_table, progress
 
@@ -22,6 +22,7 @@ class Curves:
     ----------
     options : with `gammas`, levels or the word "grid", or None
     horizon : [s]
+    limits : of each curve
 
     Raises
     ------
@@ -29,7 +30,9 @@ class Curves:
         If a level is not a number or does not exceed the threshold; the message names γ*.
     """
 
-    def __init__(self, options: argparse.Namespace, problem: Problem, horizon: float) -> None:
+    def __init__(
+        self, options: argparse.Namespace, problem: Problem, horizon: float, limits: Limits
+    ) -> None:
         self._options = options
         self._lines: list[list[str]] = []
         self._limits: list[str] = []
@@ -37,7 +40,7 @@ class Curves:
         self._solver: GammaCurveSolver | None = None
         text: str | None = options.gammas
         if text is not None:
-            self._solver = GammaCurveSolver(problem, _levels(text), horizon=horizon)
+            self._solver = GammaCurveSolver(problem, _levels(text), horizon=horizon, limits=limits)
 
     def each(self, rows: Iterable[dict[str, Any]], n_rows: int) -> Iterator[dict[str, Any]]:
         """Yield the rows with `gamma_curve` and `undisturbed_value` added."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..comparison.optima import record_path
 from ..comparison.records import trajectory_of
-from ..offline import BestResponse, ControlPolicy, WorstCase, WorstCaseSolver, linear_policy
+from ..offline import BestResponse, ControlPolicy, Limits, WorstCase, WorstCaseSolver, linear_policy
 from ..online import load
 from ..symbolic import Problem, RunError
 from .output import print_table, progress
@@ -20,8 +20,9 @@ UNKNOWN_SADDLE = dict.fromkeys(("upper", "lower", "gap", "second_order"))
 class Saddle:
     """Best responses and worst cases of all states, if they were asked for."""
 
-    def __init__(self, options: argparse.Namespace, problem: Problem) -> None:
+    def __init__(self, options: argparse.Namespace, problem: Problem, limits: Limits) -> None:
         self._options = options
+        self._limits = limits
         self._problem = problem
         self._lines: list[list[str]] = []
 
@@ -32,9 +33,9 @@ class Saddle:
         if not self._options.saddle:
             yield from rows
             return
-        best = BestResponse(self._problem)
+        best = BestResponse(self._problem, limits=self._limits)
         policy = ControlPolicy(self._problem, linear_policy(self._problem))
-        worst = WorstCaseSolver(policy)
+        worst = WorstCaseSolver(policy, limits=self._limits)
         with progress(self._options) as tell:
             for i, row in enumerate(rows):
                 tell("best responses and worst cases", i / n_rows)
@@ -55,6 +56,8 @@ class Saddle:
             except RunError as error:
                 faults.append(f"best responses: {error}")
         case = worst.solve(row["zeta"])
+        if case.ended:
+            faults.append(f"worst case: {case.unbounded}")
         linear = _described(case, row["value"]) | {"l2_gain": worst.policy.l2_gain}
         return {"saddle": saddle, "worst_case": {"linear": linear}, "faults": faults}
 
@@ -71,7 +74,7 @@ def _described(case: WorstCase, value: float | None) -> dict[str, Any]:
     return {
         "cost": case.cost if bounded else None,
         "excess": case.excess(value) if bounded and value else None,
-        "bounded": bounded,
+        "bounded": None if case.ended else bounded,
         "note": case.unbounded,
     }
 
@@ -83,7 +86,7 @@ def _cells(added: dict[str, Any]) -> list[str]:
         *(f"{saddle[name]:.8g}" if known else "–" for name in ("upper", "lower")),
         f"{saddle['gap']:.1e}" if known else "–",
         {True: "yes", False: "no", None: "–"}[saddle["second_order"]],
-        "unbounded" if not linear["bounded"] else f"{linear['cost']:.8g}",
+        {True: f"{linear['cost'] or 0.0:.8g}", False: "unbounded", None: "–"}[linear["bounded"]],
         "–" if linear["excess"] is None else f"{100 * linear['excess']:.2f} %",
         f"{linear['l2_gain']:.4f}",
     ]

@@ -3,6 +3,7 @@
 from .certificate import Certificate
 from .direct import DirectSolution, DirectSolver, QuickValue
 from .ideal_weights import ErrorSize, IdealWeights, Pairs, error_sizes, fit_weights
+from .limits import EndedByLimitError, Limits, Reached
 from .path import MeshSettings, Plant, Trajectory
 from .responses import (
     BestResponse,
@@ -36,12 +37,14 @@ __all__ = [
     "ControlPolicy",
     "DirectSolution",
     "DirectSolver",
+    "EndedByLimitError",
     "ErrorSize",
     "GainMeter",
     "GammaCurve",
     "GammaCurveSolver",
     "GammaPoint",
     "IdealWeights",
+    "Limits",
     "MeasuredGain",
     "MeshSettings",
     "OfflineSettings",
@@ -50,6 +53,7 @@ __all__ = [
     "Pairs",
     "Plant",
     "QuickValue",
+    "Reached",
     "SaddleGap",
     "SaddleSolution",
     "SaddleSolver",

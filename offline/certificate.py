@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 
+import numpy as np
+
+from .direct import DirectSolution
 from .settings import OfflineSettings
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """The evidence for one solution.
+    """The evidence for one solution; a number that is not known is NaN.
 
     Attributes
     ----------
@@ -38,6 +42,23 @@ class Certificate:
     second_order: bool
     gradient_unique: bool
 
+    @classmethod
+    def unknown(cls, solution: DirectSolution) -> Certificate:
+        """Return what is known of a solution by itself: nothing of the error of its value."""
+        value = max(abs(solution.value), np.finfo(float).tiny)
+        return cls(
+            value_error=math.nan,
+            defect=solution.defect,
+            hji_residual=solution.hji_residual,
+            costate_error=math.nan,
+            horizon_error=math.nan,
+            refinement_error=math.nan,
+            integration_error=abs(solution.reintegrated_value - solution.value) / value,
+            disagreement=math.nan,
+            second_order=solution.second_order,
+            gradient_unique=True,
+        )
+
     def faults(self, settings: OfflineSettings) -> list[str]:
         """Return what breaks the tolerances, in words; empty if the certificate holds."""
         limits = {
@@ -48,7 +69,9 @@ class Certificate:
         }
         values = asdict(self)
         found = [
-            f"{name} is {values[name]:.1e}, over {limit:.0e}"
+            f"{name} is not known"
+            if math.isnan(values[name])
+            else f"{name} is {values[name]:.1e}, over {limit:.0e}"
             for name, limit in limits.items()
             if not values[name] <= limit
         ]

@@ -9,6 +9,7 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, Pos
 
 from ..symbolic import Problem
 from ..symbolic.toml import Settings
+from .limits import Limits
 from .path import MeshSettings
 
 Method = Literal["newton", "ipopt"]
@@ -20,7 +21,8 @@ class OfflineSettings(Settings):
     Attributes
     ----------
     horizon : [s]; after it the cost is ζ(T)'P ζ(T). None chooses it by the decay of the closed loop
-    intervals : K at the start, before alignment and refinement
+    intervals : K at the start, before alignment and refinement; more for a fast problem, unless it or
+        the grading is chosen
     degree : Radau points an interval at the start
     grading : about the logarithm of the ratio of the last to the first interval; 0 is uniform
     aligned : put mesh points where switching functions change sign, such as the velocities under drag
@@ -28,6 +30,8 @@ class OfflineSettings(Settings):
     starts : pairs of continuations that look for other extremals; 0 looks for none
     method : "newton", the structured Newton method where the plant is fully actuated and IPOPT
         elsewhere, or "ipopt" always
+    max_iterations, max_seconds : of a solve, all of its parts together, its certificate too; one that
+        reaches them ends with the reason and what it has [-, s]
     value_tolerance : largest relative value error of a solve that counts as converged
     defect_tolerance : largest gap to the re-integrated trajectory, in half-widths
     hji_tolerance : largest residual of (7), relative to the state cost
@@ -42,14 +46,28 @@ class OfflineSettings(Settings):
     rounds: PositiveInt = 5
     starts: NonNegativeInt = 4
     method: Method = "newton"
+    max_iterations: PositiveInt = 10_000
+    max_seconds: PositiveFloat = 300.0
     value_tolerance: PositiveFloat = 1e-7
     defect_tolerance: PositiveFloat = 1e-6
     hji_tolerance: PositiveFloat = 1e-7
     costate_tolerance: PositiveFloat = 1e-5
 
-    def mesh(self, horizon: float) -> MeshSettings:
-        """Return the first mesh, over a horizon [s]; normally that of `horizon_of`."""
-        return MeshSettings(horizon, self.intervals, self.degree, self.grading)
+    @property
+    def limits(self) -> Limits:
+        """The limits of a solve."""
+        return Limits(self.max_iterations, self.max_seconds)
+
+    def mesh(self, problem: Problem) -> MeshSettings:
+        """Return the first mesh, over `horizon_of`.
+
+        Where neither intervals nor grading differ from their defaults, they are made to resolve the
+        fastest mode; what is asked for is what the mesh has.
+        """
+        asked = MeshSettings(horizon_of(problem, self), self.intervals, self.degree, self.grading)
+        default = MeshSettings.certified
+        chosen = (self.intervals, self.grading) != (default.n_intervals, default.grading)
+        return asked if chosen else asked.resolving(problem.fastest_rate)
 
 
 def horizon_of(problem: Problem, settings: OfflineSettings) -> float:

@@ -12,8 +12,17 @@ from numpy.typing import ArrayLike
 from ..symbolic import Problem, RunError
 from ..symbolic.arrays import Array
 from .certificate import Certificate
-from .direct import DirectSolution, DirectSolver, Refined, by_turns, find_extremals, refine
-from .path import Trajectory, extended, halved
+from .direct import (
+    DirectSolution,
+    DirectSolver,
+    Refined,
+    aligned_extremals,
+    by_turns,
+    find_extremals,
+    refine,
+)
+from .limits import LimitError, Work, limited
+from .path import MeshSettings, Trajectory, extended, halved
 from .saddle import SaddleSolution, SaddleSolver
 from .settings import OfflineSettings, horizon_of
 
@@ -30,7 +39,8 @@ class OfflineSolution:
     certificate : the error of `direct`
     faults : what breaks the tolerances; empty if the certificate holds
     turns : (n,) whole periods by which the cheapest start is written off the short way
-    rounds : of mesh refinement
+    rounds : of mesh refinement; 0 where it was not finished
+    ended : why the solve ended before its certificate was complete, or nothing
     seconds : wall time, certificate included
     """
 
@@ -41,6 +51,7 @@ class OfflineSolution:
     faults: list[str]
     turns: tuple[int, ...]
     rounds: int
+    ended: str
     seconds: float
 
     @property
@@ -61,36 +72,49 @@ class OfflineSolver:
         self.problem = problem
         self.settings = OfflineSettings() if settings is None else settings
         self.horizon = horizon_of(problem, self.settings)
-        self.direct = DirectSolver(
-            problem, self.settings.mesh(self.horizon), method=self.settings.method
-        )
+        self.direct = DirectSolver(problem, self.settings.mesh(problem), method=self.settings.method)
 
     def solve(self, zeta0: Array, guess: Trajectory | None = None) -> OfflineSolution:
         """Return the optimum from `zeta0` and its certificate.
 
         Near half a turn both turns are solved, and the cheaper one is the optimum; see `Angles`.
         `guess` is where the first solve starts, instead of the linear H-infinity policy; the other
-        starts of the search for extremals, and the saddle point, don't use it.
+        starts of the search for extremals, and the saddle point, don't use it. A solve that reaches the
+        limits of the settings after it has found an optimum returns that, with what is known of it, and
+        `ended` is the first of its faults.
 
         Raises
         ------
         InputError
             If the state is not n finite numbers inside the domain.
+        EndedByLimitError
+            If the limits are reached before the first optimum is found.
         RunError
             If no solver converges inside the domain.
         """
-        started = time.perf_counter()
-        refined, others = self._cheapest(self._by_turns(zeta0, guess))
-        saddle = self._saddle_point(refined.solution)
-        certificate = self._certify(refined, others, saddle)
+        started, ended = time.perf_counter(), ""
+        with limited(self.settings.limits) as work:
+            firsts = self._by_turns(zeta0, guess)
+            solution = min(firsts, key=lambda first: first.value)
+            saddle, others, rounds = None, list[DirectSolution](), 0
+            certificate = Certificate.unknown(solution)
+            try:
+                refined, others = self._cheapest(firsts)
+                solution, rounds = refined.solution, refined.rounds
+                certificate = Certificate.unknown(solution)
+                saddle = self._saddle_point(solution)
+                certificate = self._certify(refined, others, saddle)
+            except LimitError as limit:
+                ended = _own(limit, work)
         return OfflineSolution(
-            direct=refined.solution,
+            direct=solution,
             saddle=saddle,
             others=others,
             certificate=certificate,
-            faults=certificate.faults(self.settings),
-            turns=tuple(int(n) for n in self.problem.angles.turns(refined.solution.zeta)),
-            rounds=refined.rounds,
+            faults=[ended] * bool(ended) + certificate.faults(self.settings),
+            turns=tuple(int(n) for n in self.problem.angles.turns(solution.zeta)),
+            rounds=rounds,
+            ended=ended,
             seconds=time.perf_counter() - started,
         )
 
@@ -106,18 +130,14 @@ class OfflineSolver:
 
     def _cheapest(self, firsts: list[DirectSolution]) -> tuple[Refined, list[DirectSolution]]:
         """Return the refined cheapest extremal, and the others on aligned meshes."""
-        found = [
-            (first.zeta, extremal)
+        extremals = [
+            extremal
             for first in firsts
             for extremal in find_extremals(self.direct, first, starts=self.settings.starts)
         ]
-        extremals = [extremal for _, extremal in found]
         if self.settings.aligned and len(extremals) > 1:
-            # which is cheapest may hang on the error of the first mesh
-            extremals = [
-                self.direct.solve_aligned(zeta, guess=each.trajectory, verify=False)[0]
-                for zeta, each in found
-            ]
+            known = min(first.value for first in firsts)
+            extremals = aligned_extremals(self.direct, extremals, known)
         extremals.sort(key=lambda solution: solution.value)
         best = extremals[0]
         refined = refine(self.direct, self.settings, best.zeta, best.trajectory)
@@ -205,7 +225,15 @@ class OfflineSolver:
 
     @cached_property
     def _saddle(self) -> SaddleSolver:
-        return SaddleSolver(self.problem, horizon=self.horizon)
+        mesh = MeshSettings.saddle.changed(horizon=self.horizon)
+        return SaddleSolver(self.problem, mesh.resolving(self.problem.fastest_rate))
+
+
+def _own(limit: LimitError, work: Work) -> str:
+    """Return what a limit of this work says; raises that of another, which this is a part of."""
+    if limit.work is not work:
+        raise limit
+    return str(limit)
 
 
 def solve(

@@ -55,8 +55,9 @@ def test_rows_are_the_runs_that_were_asked_for(user_folder: Path, capsys: Captur
         )
         assert row["policy"] == ("learned", "linear")[i % 2]
         record, station = contender_record(one, row["policy"]), one.station_keeping()
-        optimum = QuickValue(station.problem)(zeta)
-        metrics = run_metrics(record, station, optimum)
+        value = QuickValue(station.problem)
+        optimum = value(zeta)
+        metrics = run_metrics(record, station, optimum, value)
         assert row["optimum"] == optimum
         for name in ("cost", "regret", "position_rms", "energy", "effort", "rest_share"):
             assert row[name] == getattr(metrics, name), name

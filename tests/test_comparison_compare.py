@@ -185,13 +185,18 @@ RUN = RunMetrics(
 
 
 def test_what_runs_are_held_against(study: Study) -> None:
-    """The game's cost has the rest, the clairvoyant's does not; only the latter is doubted."""
+    """The game's cost has the rest, the clairvoyant's does not; a run below either is a fault."""
     record, optima = study.optimal, [Optimum(100.0, 1e-6)]
     game, clairvoyant = GameOptimum(record, optima), ClairvoyantOptimum(record, optima)
     assert (game.cost(RUN), clairvoyant.cost(RUN)) == (110.0, 100.0)
     assert (game.too_short(RUN), clairvoyant.too_short(RUN)) == (True, False)
-    cheaper = {"lqr": -0.02, "linear": 0.1}
-    assert game.doubts(0, cheaper) == []
+    cheaper = {"lqr": dataclasses.replace(RUN, regret=-0.02), "linear": RUN}
+    (doubt,) = game.doubts(0, cheaper)
+    assert doubt.startswith("LQR: its regret is -2.0e-02, below zero by more than the error 1e-06")
+    within = {"lqr": dataclasses.replace(RUN, regret=-5e-7)}
+    assert game.doubts(0, within) == []
+    uncertain = {"lqr": dataclasses.replace(RUN, regret=-0.02, cost_error=0.03)}
+    assert game.doubts(0, uncertain) == []
     assert clairvoyant.doubts(0, cheaper) == ["clairvoyant optimum: the run of LQR costs 2 % less"]
     assert not ClairvoyantOptimum(None, optima).known
 

@@ -27,7 +27,7 @@ WINGS = {
         *("loop", "vehicle", "records", "simulate"),
     ),
     "offline": (
-        *("path", "settings", "direct", "saddle", "certificate", "solve"),
+        *("limits", "path", "settings", "direct", "saddle", "certificate", "solve"),
         *("responses", "ideal_weights"),
     ),
     "comparison": (

@@ -39,8 +39,9 @@ def run(options: argparse.Namespace) -> int:
     states = np.array(initial_states(options, scenario))
     asked = numbers(options, scenario)
     problem = scenario.setup().problem
-    curves = Curves(options, problem, horizon_of(problem, scenario.offline))
-    saddle = Saddle(options, problem)
+    limits = scenario.offline.limits
+    curves = Curves(options, problem, horizon_of(problem, scenario.offline), limits)
+    saddle = Saddle(options, problem, limits)
     folder = output_folder(options)
     with locked(folder):
         remove_temporaries(folder, "offline.*")

@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
         print_json(answer)
     else:
         _print(answer, scenario)
-    return 1 if swept.failed else 0
+    return 1 if swept.failed or swept.faults else 0
 
 
 def _require_numbers(options: argparse.Namespace) -> None:
@@ -107,9 +107,12 @@ def _print(answer: dict[str, Any], scenario: Scenario) -> None:
     short = sum(group["too_short"] for group in groups)
     if game and short:
         print(
-            f"{short} of the runs ended with more than a thousandth of the cost still to come, "
-            "estimated as ζ'P ζ: their regret says little, raise simulation.duration"
+            f"{short} of the runs ended with more than a thousandth of the cost still to come, counted "
+            "as V* of their last state: their regret is that of the time before, raise "
+            "simulation.duration"
         )
+    for fault in answer["faults"]:
+        print(f"wrong: {fault}")
     print(
         f"{answer['runs']} runs, {answer['failed']} failed, {answer['resumed']} were there already; "
         f"table: {answer['table']}"

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from ...symbolic import Setup, StationKeeping, Vehicle
+from ...offline import QuickValue
+from ...symbolic import RunError, Setup, StationKeeping, Vehicle
 from ...symbolic.arrays import Array
 from .cost import cost_to_date, cost_to_go
 from .learning import learning_fault
 from .regrets import regret
+
+SMALL_REST = 1e-3  # of the cost: what is left may be estimated as ζ'P ζ
+ESTIMATE_ERROR = 1e-2  # relative, of that estimate then
+RUN_ERROR = 1e-7  # relative, of a run's integrals, which are integrated with error control to 1e-8
 
 
 @dataclass(frozen=True)
@@ -23,8 +29,8 @@ class RunMetrics:
 
     Attributes
     ----------
-    cost : integral of r of (5) in `game` mode, of ζ'Qζ + u_1'R u_1 in `disturbed` mode, plus
-        ζ(T)'P ζ(T) for the rest; None if the run ended early
+    cost : integral of r of (5) in `game` mode, of ζ'Qζ + u_1'R u_1 in `disturbed` mode, plus what is
+        left after the run; None if the run ended early
     running_cost : the integral alone; None if the run ended early
     regret : (cost - V*) / V*, or in `disturbed` mode (running cost - V_c) / V_c with the clairvoyant
         optimum; None without an optimum or if the run ended early
@@ -36,10 +42,12 @@ class RunMetrics:
         in a run without limits
     policy_microseconds, policy_mean : median and mean wall time of a policy's step [us]; a policy that
         learns or predicts only now and then has a much higher mean; None if it was not taken
-    rest_share : part of the cost that is the estimate ζ(T)'P ζ(T)
+    rest_share : part of the cost that is what is left: ζ(T)'P ζ(T), or V*(ζ(T)) where it is more than a
+        thousandth of a game's cost and V* is known
     peak_thrust : largest share of a thruster's limit that the least-norm allocation asks for [-]
     stopped : why the run ended early, or None
     unlearned : why its learner learned nothing although it was due, or None
+    cost_error : relative, of the cost: of its integral and of what is left; None if the run ended early
     """
 
     cost: float | None
@@ -56,9 +64,15 @@ class RunMetrics:
     peak_thrust: float | None
     stopped: str | None
     unlearned: str | None = None
+    cost_error: float | None = None
 
 
-def run_metrics(record: xr.Dataset, setup: Setup, optimum: float | None) -> RunMetrics:
+def run_metrics(
+    record: xr.Dataset,
+    setup: Setup,
+    optimum: float | None,
+    value: Callable[[Array], float] | None = None,
+) -> RunMetrics:
     """Return the figures of merit of a closed-loop record against V* = `optimum`.
 
     In `game` mode u_2 is what the run's own disturbance player did.
@@ -68,14 +82,17 @@ def run_metrics(record: xr.Dataset, setup: Setup, optimum: float | None) -> RunM
     record : with `zeta`, `cost` and `attenuated` over `time`; of a vehicle with `tau_b`, too
     setup : of the problem; a `StationKeeping` for what only a vehicle has
     optimum : None if it is not known
+    value : V* for what is left after a run of the game; ζ'P ζ if None
     """
     stopped = str(record.attrs["stopped"]) or None
-    cost = running_cost = rest_share = None
+    cost = running_cost = rest_share = cost_error = None
     if stopped is None:
-        rest = cost_to_go(record["zeta"].values[-1], setup.problem.P)
         running_cost = float(cost_to_date(record)[-1])
+        known = value if record.attrs["mode"] == "game" else None
+        rest, error = _rest(record["zeta"].values[-1], setup.problem.P, running_cost, known)
         cost = running_cost + rest
         rest_share = rest / cost if cost > 0.0 else 0.0
+        cost_error = RUN_ERROR + (error / cost if cost > 0.0 else 0.0)
     vehicle = setup.model.vehicle if isinstance(setup, StationKeeping) and "tau_b" in record else None
     position = record["zeta"].values[: 0 if vehicle is None else None, :3]
     distance = np.linalg.norm(position, axis=1)
@@ -94,7 +111,28 @@ def run_metrics(record: xr.Dataset, setup: Setup, optimum: float | None) -> RunM
         peak_thrust=None if vehicle is None else peak_thrust(record["tau_b"].values, vehicle),
         stopped=stopped,
         unlearned=learning_fault(record),
+        cost_error=cost_error,
     )
+
+
+def _rest(
+    end: Array, P: Array, spent: float, value: Callable[[Array], float] | None
+) -> tuple[float, float]:
+    """Return what is left of the cost after a run, and its error.
+
+    ζ'P ζ knows the linearised plant only: far from the station it may be too small, as where drag is
+    quadratic alone, and a run that ends there would cost less than the optimum.
+    """
+    estimate = cost_to_go(end, P)
+    if estimate <= SMALL_REST * (spent + estimate):
+        return estimate, ESTIMATE_ERROR * estimate
+    if value is not None:
+        try:
+            rest = value(end)
+        except RunError:
+            return estimate, estimate
+        return rest, QuickValue.error * rest
+    return estimate, estimate
 
 
 def _attribute(record: xr.Dataset, name: str) -> float | None:

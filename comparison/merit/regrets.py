@@ -30,6 +30,21 @@ def regret(cost: float | None, optimum: float | None) -> float | None:
     return (cost - optimum) / optimum
 
 
+def below_optimum(regret: float | None, error: float) -> str | None:
+    """Return the fault of a regret that no policy can have; None if it is possible, or not known.
+
+    Parameters
+    ----------
+    error : relative, of the optimum and of the run's cost together
+    """
+    if regret is None or not regret < -error:
+        return None
+    return (
+        f"its regret is {regret:.1e}, below zero by more than the error {error:.0e} of optimum and "
+        "cost: one of the two is wrong"
+    )
+
+
 @dataclass(frozen=True)
 class Regret:
     """How the regret of n runs is distributed.

@@ -56,6 +56,7 @@ KEY: dict[str, Any] = {
     **dict.fromkeys(("vehicle", "current", "envelope"), True),
     "game": {"Q": True, "R": True},
     "simulation": dict.fromkeys(_SIMULATION, True),
+    "offline": {"max_iterations": True, "max_seconds": True},
 }
 
 
@@ -119,6 +120,8 @@ def _described(found: Clairvoyant, check: SelfCheck) -> dict[str, Any]:
     confirmed = np.isfinite(found.mesh_error)
     error = gap + (found.mesh_error if confirmed else 0.0)
     faults = [] if confirmed else ["one degree more did not converge, and only integration checks it"]
+    if found.ended:
+        faults.insert(0, found.ended)
     if not error <= LARGEST_ERROR:
         faults.append(f"the value's relative error is {error:.1e}, over {LARGEST_ERROR:.0e}")
     if not found.second_order.holds:
@@ -156,7 +159,14 @@ def clairvoyant(scenario: Scenario) -> tuple[Clairvoyant, SelfCheck]:
     compiled = (
         station.model.compiled and source.steady
     )  # what is not has too many numbers for one solve
-    solver = ClairvoyantSolver(stage, station.game.R, horizon, source.breaks, compiled=compiled)
+    solver = ClairvoyantSolver(
+        stage,
+        station.game.R,
+        horizon,
+        source.breaks,
+        limits=scenario.offline.limits,
+        compiled=compiled,
+    )
     plant = HeldPlant(station, source, vehicle=vehicle)
     starts = station.problem.starts(scenario.initial_state)
     turns = by_turns(starts, lambda start: (solver.solve(start, _policies(plant)), start))

@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...offline import DirectSolution, OfflineSolution, OfflineSolver, Trajectory
+from ...offline import (
+    DirectSolution,
+    EndedByLimitError,
+    OfflineSolution,
+    OfflineSolver,
+    Reached,
+    Trajectory,
+)
 from ...online import to_dataset
 from ...online.loop import Progress
 from ...online.records import listed, versions
@@ -99,7 +106,8 @@ def optimum_or_failure(
     """Return the record of the optimum from ζ_0, or of the solver's failure there.
 
     A search that fails from `guess` starts again from the linear policy. Where that does not converge
-    either the record holds the reason, `failed`, and no trajectory.
+    either the record holds the reason, `failed`, and no trajectory, but the one that the solver had
+    reached where its limits ended it: `reached_zeta` and `reached_v`, with `reached_cost`.
     """
     started = time.perf_counter()
     try:
@@ -110,14 +118,23 @@ def optimum_or_failure(
             "failed": str(error),
             "certified_seconds": time.perf_counter() - started,
         }
-        return failure_record(zeta0, attributes)
+        reached = error.reached if isinstance(error, EndedByLimitError) else None
+        return failure_record(zeta0, attributes, reached)
     return optimum_to_dataset(scenario, solution, attributes)
 
 
-def failure_record(zeta0: Array, attributes: dict[str, Any]) -> xr.Dataset:
-    """Return the record of a solve from ζ_0 that failed: the state, versions, no trajectory."""
+def failure_record(
+    zeta0: Array, attributes: dict[str, Any], reached: Reached | None = None
+) -> xr.Dataset:
+    """Return the record of a solve from ζ_0 that failed: the state, versions, what it had reached."""
     attributes = attributes | versions()
-    return xr.Dataset({"zeta": ("state", zeta0)}, attrs=attributes)
+    record = xr.Dataset({"zeta": ("state", zeta0)}, attrs=attributes)
+    if reached is None:
+        return record
+    states, v = (("reached_time", "state"), reached.states), (("reached_node", "input"), reached.v)
+    times = {"reached_time": reached.times, "reached_node": reached.times[1:]}
+    record = record.assign(reached_zeta=states, reached_v=v).assign_coords(times)
+    return record.assign_attrs(reached_cost=reached.cost)
 
 
 def _solve(solver: OfflineSolver, zeta0: Array, guess: Trajectory | None) -> OfflineSolution:

@@ -26,7 +26,8 @@ def too_short(comparison: Comparison) -> str:
     """Return a warning that some runs end while their cost still grows."""
     return (
         f"The runs are too short for a regret of {', '.join(comparison.too_short)}: more than 0.1 % of "
-        "the cost is the estimate ζ'P ζ for the rest; raise simulation.duration."
+        "the cost is V* of the state at their end, as if all went on optimally; raise "
+        "simulation.duration."
     )
 
 

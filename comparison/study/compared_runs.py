@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from ...offline import OfflineSolver
+from ...offline import OfflineSolver, QuickValue
 from ...symbolic import RunError, Setup
 from ...symbolic.pyfile import is_named
 from ..merit import RunMetrics, regret, run_metrics
@@ -109,6 +109,7 @@ def _worker(shipment: tuple[list[Scenario], Path]) -> Work[_Task, RunMetrics | O
     scenarios, folder = shipment
     setup = scenarios[0].setup()
     solver = OfflineSolver(setup.problem, scenarios[0].offline)
+    value = QuickValue(setup.problem)
 
     def work(task: _Task) -> Iterator[RunMetrics | Optimum]:
         scenario, path = scenarios[task.state], record_path(folder, task.state, task.what)
@@ -117,7 +118,8 @@ def _worker(shipment: tuple[list[Scenario], Path]) -> Work[_Task, RunMetrics | O
         elif task.what == CLAIRVOYANT:
             yield _optimum(lambda: clairvoyant_record(scenario, path))
         else:
-            yield run_metrics(contender_record(scenario, task.what, path), setup, None)
+            record = contender_record(scenario, task.what, path)
+            yield run_metrics(record, setup, None, value)
 
     return work
 

@@ -123,8 +123,7 @@ class Comparison:
             if optimum.fault:
                 found.append(f"{where}offline optimum: {optimum.fault}")
             runs = {name: runs[i] for name, runs in self.all_metrics.items() if i < len(runs)}
-            regrets = {name: run.regret for name, run in runs.items()}
-            found += [f"{where}{doubt}" for doubt in self.reference.doubts(i, regrets)]
+            found += [f"{where}{doubt}" for doubt in self.reference.doubts(i, runs)]
             for name in TWO:
                 stopped = runs[name].stopped
                 if stopped:

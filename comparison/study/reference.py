@@ -15,7 +15,7 @@ import xarray as xr
 
 from ...offline import QuickValue
 from ...symbolic import Setup
-from ..merit import Regret, RunMetrics, dissipation_margin
+from ..merit import Regret, RunMetrics, below_optimum, dissipation_margin
 from ..policies import label_of
 from ..records import KIND as CLAIRVOYANT
 from ..scenario import Scenario
@@ -75,8 +75,8 @@ class Reference(ABC):
         """Return whether the run ended before its regret was decided."""
 
     @abstractmethod
-    def doubts(self, state: int, regrets: Mapping[str, float | None]) -> list[str]:
-        """Return what speaks against the optimum from a state; `regrets` of the policies there."""
+    def doubts(self, state: int, runs: Mapping[str, RunMetrics]) -> list[str]:
+        """Return what speaks against the optimum from a state; `runs` of the policies from there."""
 
     @abstractmethod
     def margins(self, setup: Setup, records: Mapping[str, xr.Dataset]) -> dict[str, float]:
@@ -116,9 +116,14 @@ class GameOptimum(Reference):
         """Return whether more than a thousandth of the cost is still to come."""
         return (run.rest_share or 0.0) > 1e-3
 
-    def doubts(self, state: int, regrets: Mapping[str, float | None]) -> list[str]:
-        """Return nothing: its certificate speaks for it."""
-        return []
+    def doubts(self, state: int, runs: Mapping[str, RunMetrics]) -> list[str]:
+        """Return the policies that cost less, beyond the errors of the value and of their runs."""
+        found = []
+        for name, run in runs.items():
+            error = self.optima[state].value_error + (run.cost_error or 0.0)
+            fault = below_optimum(run.regret, error)
+            found += [] if fault is None else [f"{label_of(name)}: {fault}"]
+        return found
 
     def margins(self, setup: Setup, records: Mapping[str, xr.Dataset]) -> dict[str, float]:
         """Return none: the second player keeps to the game."""
@@ -179,11 +184,12 @@ class ClairvoyantOptimum(Reference):
         """Return False: the regret is that of the time of the run."""
         return False
 
-    def doubts(self, state: int, regrets: Mapping[str, float | None]) -> list[str]:
+    def doubts(self, state: int, runs: Mapping[str, RunMetrics]) -> list[str]:
         """Return its own fault, and the policies that cost less."""
         optimum = self.optima[state]
         found = [optimum.fault] if optimum.fault else []
-        for name, regret in regrets.items():
+        for name, run in runs.items():
+            regret = run.regret
             if regret is not None and regret < -optimum.value_error:
                 found.append(f"the run of {label_of(name)} costs {-100 * regret:.2g} % less")
         return [f"{self.name}: {doubt}" for doubt in found]

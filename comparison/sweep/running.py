@@ -19,7 +19,7 @@ from ..scenario import Scenario
 from .sweep import Execute, Setup, Sweep
 from .sweep_plan import Plan, Run, Sampling
 from .sweep_run import FinishedRun, WorkerSettings
-from .sweep_summary import summary
+from .sweep_summary import faults, summary
 from .vary import parse_vary
 
 Stage = Callable[[str, int, int, int], None]
@@ -34,6 +34,7 @@ class SweepResult:
     runs, failed, resumed : how many were asked for, failed, and were there already
     table, csv : the rows of all runs
     summary : for each setting and policy the quantiles over its runs
+    faults : runs whose regret no policy can have: their optimum or their cost is wrong
     seconds : wall time
     """
 
@@ -43,6 +44,7 @@ class SweepResult:
     table: Path
     csv: Path
     summary: list[dict[str, Any]]
+    faults: list[str]
     seconds: float
 
 
@@ -114,6 +116,7 @@ def sweep(
         resumed = _all_runs(going, execute, told)
         csv, table = going.write_tables()
         groups = summary(going.rows(), [choice.key for choice in plan.choices])
+        found = faults(going.rows())
     return SweepResult(
         runs=len(plan),
         failed=sum(group["failed"] for group in groups),
@@ -121,6 +124,7 @@ def sweep(
         table=table,
         csv=csv,
         summary=groups,
+        faults=found,
         seconds=time.monotonic() - started,
     )
 

@@ -26,6 +26,7 @@ from ..scenario import Scenario
 from .vary import Choices, Range, varied
 
 Sampling = Literal["random", "latin", "sobol"]
+ROWS = 2  # raise it when the figures of a row, or how they are made, change
 FILES = ("vehicle", "problem", "simulation.plant", "basis.name", "learner.weights", "learner.rule")
 
 
@@ -196,7 +197,7 @@ class Plan:
             """Return the hash of what every run depends on, with the files that settings name."""
             one = varied(self.scenario, json.loads(named))
             driven = one.plant_vehicle()
-            parts = [str(FORMAT), repr(sorted(versions().items())), self.kept]
+            parts = [f"{FORMAT}, rows {ROWS}", repr(sorted(versions().items())), self.kept]
             vehicle = one.problem is None
             model = one.model_vehicle().model_dump_json() if vehicle else model_text(one.setup())
             parts += [self.scenario.model_dump_json(), model]

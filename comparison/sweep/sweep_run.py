@@ -30,6 +30,7 @@ FIGURES: dict[str, str] = {
     "cost": "cost",
     "optimum": "cost",
     "regret": "1",
+    "regret_error": "1",
     "dissipation_margin": "cost",
     "position_rms": "m",
     "excursion": "m",
@@ -154,8 +155,10 @@ def _figures(record: xr.Dataset, setup: Setup, value: QuickValue) -> dict[str, A
             row["optimum"] = value(zeta[0])
         except RunError as error:
             row["reason"] = row["reason"] or f"the optimum is not known: {error}"
-    found = vars(run_metrics(record, setup, row.get("optimum")))
+    found = vars(run_metrics(record, setup, row.get("optimum"), value))
     row |= {name: found[name] for name in FIGURES if name in found}
+    if found["regret"] is not None:
+        row["regret_error"] = QuickValue.error + found["cost_error"]
     row["fallback"] = float(fallback.mean()) if len(fallback) else None
     row["ended"] = float(time_axis[-1]) if len(time_axis) else None
     if disturbed and len(zeta) and not row["reason"]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..merit import QUANTILES, Regret
+from ..merit import QUANTILES, Regret, below_optimum
 
 FIGURES = ("regret", "position_rms", "energy", "policy_mean")
 REFERENCE = "linear"
@@ -77,6 +77,18 @@ def summary(rows: Iterable[Mapping[str, Any]], settings: Sequence[str]) -> list[
         head = {"policy": policy, "settings": dict(zip(settings, values, strict=True))}
         found.append(head | group.told() | {"of_linear": of_linear})
     return found
+
+
+def faults(rows: Iterable[Mapping[str, Any]], most: int = 20) -> list[str]:
+    """Return the runs whose regret no policy can have, the first `most` and how many more there are."""
+    found, more = list[str](), 0
+    for row in rows:
+        fault = None if row["failed"] else below_optimum(row["regret"], row["regret_error"] or 0.0)
+        if fault is not None and len(found) < most:
+            found.append(f"run {row['run']}, {row['policy']}: {fault}")
+        elif fault is not None:
+            more += 1
+    return [*found, f"{more} more runs have such a regret"] if more else found
 
 
 def _ratio(one: Regret, other: Regret) -> dict[str, float | None]:

@@ -2,7 +2,7 @@
 
 from .derivatives import PointDerivatives
 from .direct import DirectSolution, DirectSolver
-from .extremals import by_turns, find_extremals
+from .extremals import aligned_extremals, by_turns, find_extremals
 from .newton import StructuredNewton
 from .quick import QuickValue
 from .refinement import Refined, input_errors, refine
@@ -24,6 +24,7 @@ __all__ = [
     "against_control",
     "against_disturbance",
     "against_known",
+    "aligned_extremals",
     "by_turns",
     "find_extremals",
     "input_errors",

@@ -144,6 +144,7 @@ class DirectSolver:
         degree: int | None = None,
         guess: Trajectory | None = None,
         verify: bool = True,
+        safety_net: bool = True,
         tolerance: float = 1e-6,
         rounds: int = 6,
     ) -> tuple[DirectSolution, Array]:
@@ -155,7 +156,9 @@ class DirectSolver:
         """
 
         def solve_on(mesh: Array, guess: Trajectory | None) -> DirectSolution:
-            return self.solve(zeta0, mesh=mesh, degree=degree, guess=guess, verify=False)
+            return self.solve(
+                zeta0, mesh=mesh, degree=degree, guess=guess, verify=False, safety_net=safety_net
+            )
 
         base = self.mesh if mesh is None else mesh
         solutions, events = settle(

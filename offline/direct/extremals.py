@@ -50,16 +50,66 @@ def find_extremals(
     """Return different extremals from the initial state of `first`, the cheapest first.
 
     Started from both sides of a conjugate point, and by continuation from `starts` pairs of initial
-    states to either side (seeded), each solved from its own linear H-infinity trajectory.
+    states to either side (seeded), each solved from its own linear H-infinity trajectory. One that no
+    trajectory follows is left out; see `_is_real`.
     """
-    found = [first]
+    found, artefacts = [first], list[DirectSolution]()
     for guess in _guesses(direct, first, starts, seed):
         with contextlib.suppress(RunError):
             mesh = first.trajectory.mesh
             other = direct.solve(first.zeta, mesh=mesh, guess=guess, verify=False, safety_net=False)
-            if all(_differ(other, known, direct.problem.scale) for known in found):
-                found.append(other)
+            if all(_differ(other, known, direct.problem.scale) for known in (*found, *artefacts)):
+                (found if _is_real(direct, other) else artefacts).append(other)
     return sorted(found, key=lambda solution: solution.value)
+
+
+def aligned_extremals(
+    direct: DirectSolver, extremals: Sequence[DirectSolution], known: float
+) -> list[DirectSolution]:
+    """Return the extremals on meshes of their own sign changes, in the same order.
+
+    Which is cheapest may hang on the error of the first mesh. One dearer than the value that is `known`
+    is left out where Newton's method does not find it again there: nothing hangs on it.
+
+    Raises
+    ------
+    RunError
+        If the solver finds none of them again.
+    """
+    found, failure = list[DirectSolution](), RunError("there is no extremal")
+    for each in extremals:
+        try:
+            found.append(
+                direct.solve_aligned(
+                    each.zeta, guess=each.trajectory, verify=False, safety_net=each.value <= known
+                )[0]
+            )
+        except RunError as error:
+            failure = error
+    if not found:
+        raise failure
+    return found
+
+
+def _is_real(direct: DirectSolver, solution: DirectSolution, change: float = 0.01) -> bool:
+    """Whether one degree more finds the extremal again, its value changed by 1 % at most.
+
+    Between the points of a long interval the collocated states of a stiff plant may be anything, and
+    the discretised problem has stationary points that jump there, past a pitch of 90 degrees even.
+    """
+    path = solution.trajectory
+    try:
+        better = direct.solve(
+            solution.zeta,
+            mesh=path.mesh,
+            degree=path.degree + 1,
+            guess=path,
+            verify=False,
+            safety_net=False,
+        )
+    except RunError:
+        return False
+    return abs(better.value - solution.value) <= change * abs(solution.value)
 
 
 def _guesses(

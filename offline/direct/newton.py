@@ -28,6 +28,7 @@ from casadi import DM, SX
 from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ...symbolic.compiled import BatchKernel, dense_function
+from ..limits import LimitError, Reached, count
 from ..path import ConjugatePoint, Grid, RiccatiPass, adjoint, backward
 from .guess import LinearStart
 
@@ -115,9 +116,12 @@ class StructuredNewton:
         ------
         RunError
             If that is not reached.
+        LimitError
+            If the limits of the solve are reached; with the last trajectory.
         """
         current = self._model(zeta0, grid, accelerations)
         for iteration in range(1, max_iterations + 1):
+            self._count(grid, current)
             found = self._step(grid, current)
             trial = self._search(zeta0, grid, current, found.forward(grid), found.promised)
             small = found.promised <= tolerance**2 * current.value
@@ -131,6 +135,15 @@ class StructuredNewton:
             f"Newton's method did not converge in {iteration} iterations from "
             f"{np.array2string(zeta0, precision=3)}"
         )
+
+    def _count(self, grid: Grid, current: _Model) -> None:
+        """Count an iteration; a limit that is reached comes with the present trajectory."""
+        try:
+            count()
+        except LimitError as limit:
+            times = np.append(grid.mesh[0], grid.times)
+            limit.reached = Reached(times, current.states, current.v, current.value)
+            raise
 
     def linear_guess(self, zeta0: Array, grid: Grid) -> Array:
         """Return the accelerations (K, d, k) of the plant under the linear H-infinity policy."""

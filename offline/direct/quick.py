@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 
 from ...symbolic import Problem
 from ...symbolic.arrays import Array
+from ..limits import Limits, limited
 from ..path import MeshSettings
 from .direct import DirectSolution, DirectSolver
 from .extremals import by_turns
+
+QUICK = Limits(max_iterations=1000, max_seconds=60.0, name="QuickValue")
 
 
 class QuickValue:
@@ -22,11 +27,24 @@ class QuickValue:
     Parameters
     ----------
     problem : the game on its plant
-    settings : of the mesh, which sets the error
+    settings : of the mesh, which sets the error; made to suit the closed loop of the problem
+    limits : of one solve
+
+    Attributes
+    ----------
+    error : largest relative error of a value, with room
     """
 
-    def __init__(self, problem: Problem, settings: MeshSettings = MeshSettings.quick) -> None:
-        self._solver = DirectSolver(problem, settings)
+    error: ClassVar[float] = 5e-6
+
+    def __init__(
+        self,
+        problem: Problem,
+        settings: MeshSettings = MeshSettings.quick,
+        limits: Limits = QUICK,
+    ) -> None:
+        self._limits = limits
+        self._solver = DirectSolver(problem, settings.suited(problem))
         self._last: tuple[bytes, DirectSolution] | None = None
 
     def __call__(self, zeta: Array) -> float:
@@ -48,11 +66,12 @@ class QuickValue:
         InputError
             If the state is not n finite numbers inside the domain.
         RunError
-            If the solver does not converge.
+            If the solver does not converge, within its limits.
         """
         key = np.asarray(zeta, dtype=float).tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, self._cheapest(zeta)
+            with limited(self._limits):
+                self._last = key, self._cheapest(zeta)
         return self._last[1]
 
     def _cheapest(self, zeta: Array) -> DirectSolution:

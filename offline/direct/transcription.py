@@ -21,8 +21,10 @@ from casadi import DM, MX, SX
 
 from ...symbolic import RunError
 from ...symbolic.arrays import Array
+from ..limits import LimitError, Reached
 from ..path import Trajectory, radau_rule
 from .derivatives import Layout, PointDerivatives, exact_derivatives
+from .monitor import Monitor
 from .stage import Stage
 
 IPOPT = {
@@ -105,12 +107,22 @@ class Transcription:
         ------
         RunError
             If IPOPT does not converge; the message holds its status.
+        LimitError
+            If the limits of the solve are reached; with the last iterate.
         """
         given = [zeta0, np.diff(mesh)]
         given += [] if parameters is None else [parameters.ravel()]
         arguments = np.concatenate(given)
-        answer = self.solver(x0=self.pack(zeta0, states, inputs), p=arguments, lbg=0.0, ubg=0.0)
-        statistics = self.solver.stats()
+        solver, first = self.solver, self.pack(zeta0, states, inputs)
+        try:
+            with self._monitor.watching():
+                answer = solver(x0=first, p=arguments, lbg=0.0, ubg=0.0)
+        except LimitError as limit:
+            reached, w = self.unpack(np.array(answer["x"]).ravel())
+            times = np.append(mesh[0], self.times(mesh))
+            limit.reached = Reached(times, reached, w, float(answer["f"]))
+            raise
+        statistics = solver.stats()
         if not statistics["success"]:
             raise RunError(
                 f"IPOPT stopped with '{statistics['return_status']}' after "
@@ -151,9 +163,16 @@ class Transcription:
         options = {
             "print_time": False,
             **exact_derivatives(layout, self.derivatives, program),
+            "iteration_callback": self._monitor,
             "ipopt": IPOPT | {"max_iter": self.patience},
         }
         return casadi.nlpsol("direct", "ipopt", program, options)  # type: ignore[arg-type]
+
+    @cached_property
+    def _monitor(self) -> Monitor:
+        layout, q = Layout(self.stage, self.rule, self.n_intervals), int(self.stage.parameters.shape[0])
+        n_parameters = layout.n + self.n_intervals + q * self.n_points
+        return Monitor(layout.n_unknowns, layout.n_constraints, n_parameters)
 
     def curvature(self, optimum: Optimum) -> tuple[scipy.sparse.csc_matrix, scipy.sparse.csc_matrix]:
         """Return the Hessian of the Lagrangian and the Jacobian of the constraints at an optimum."""

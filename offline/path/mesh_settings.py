@@ -7,9 +7,12 @@ from typing import ClassVar, TypedDict, Unpack
 
 import numpy as np
 
-from ...symbolic import InputError
+from ...symbolic import InputError, Problem
 from ...symbolic.arrays import Array
 from .mesh import graded_mesh, growing_mesh
+
+LONGEST_FIRST = 1.0  # interval, in time constants of the fastest mode of the closed loop
+SHORTEST = 7.0  # horizon, in time constants of its slowest mode
 
 
 class MeshChanges(TypedDict, total=False):
@@ -81,6 +84,29 @@ class MeshSettings:
             grading = self.grading + float(np.log(longer))
             more = min(grading / self.grading, longer)
         return MeshSettings(horizon, int(np.ceil(more * self.n_intervals)), self.degree, grading)
+
+    def resolving(self, rate: float) -> MeshSettings:
+        """Return settings whose first interval is no longer than the time constant of a `rate` [1/s].
+
+        Graded more steeply, with as many more intervals as keep the ratio of neighbours. A longer first
+        interval would take the fastest mode for a kink, and the long ones behind it would allow
+        extremals that no trajectory has. Uniform meshes are returned as they are.
+        """
+        times = float(self.points[1] * rate) / LONGEST_FIRST
+        if times <= 1.0 or self.grading == 0.0:
+            return self
+        grading = self.grading + float(np.log(times))
+        n_intervals = int(np.ceil(self.n_intervals * grading / self.grading))
+        return self.changed(grading=grading, n_intervals=n_intervals)
+
+    def suited(self, problem: Problem) -> MeshSettings:
+        """Return settings that outlast the slowest mode of the closed loop and resolve the fastest.
+
+        These settings themselves where they do so already, as for every shipped vehicle.
+        """
+        least = SHORTEST / problem.decay_rate
+        longer = self if self.horizon >= least else self.lengthened(least)
+        return longer.resolving(problem.fastest_rate)
 
 
 # one solve by itself, neither aligned nor refined: to 1e-5 of the value from the shipped envelope

@@ -10,6 +10,7 @@ from scipy.interpolate import BarycentricInterpolator
 from scipy.optimize import brentq
 
 from ...symbolic.arrays import Array
+from ..limits import check
 from .plant import Plant, Policy
 from .trajectory import Trajectory
 
@@ -43,6 +44,7 @@ def reintegrate(plant: Plant, zeta0: Array, path: Trajectory) -> tuple[float, fl
     collocated = path.at_mesh()
     state, cost, worst = zeta0, 0.0, 0.0
     for i, span in enumerate(pairwise(path.mesh)):
+        check()
         start = state if chained else collocated[i]
         policy = _open_loop(path.input_polynomial(i))
         reached, running = plant.simulate(start, policy, np.array(span))

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import SecondOrder, Stage, against_control, against_disturbance
+from ..limits import Limits, limited
 from ..path import Trajectory
 from ..settings import OfflineSettings
 from ..solve import solve
@@ -81,10 +82,14 @@ class BestResponse:
     problem : the game on its plant, γ finite
     starts : perturbed starts of each player, beside the saddle point
     seed : of the perturbations
+    limits : of one solve, both players together
     """
 
-    def __init__(self, problem: Problem, *, starts: int = 2, seed: int = 0) -> None:
+    def __init__(
+        self, problem: Problem, *, starts: int = 2, seed: int = 0, limits: Limits | None = None
+    ) -> None:
         self.problem = problem
+        self.limits = Limits() if limits is None else limits
         self.starts = starts
         self.seed = seed
         game = problem.game
@@ -106,10 +111,15 @@ class BestResponse:
         InputError
             If the state is not n finite numbers inside the domain.
         RunError
-            If a response does not converge from any start, or the path has a conjugate point.
+            If a response does not converge from any start, or the path has a conjugate point; an
+            `EndedByLimitError` if the limits are reached.
         """
-        started, zeta0 = time.perf_counter(), self.problem.require_state(zeta0)
-        zeta0 = self.problem.angles.beside(zeta0, path.states[0])  # by the turn of the path
+        zeta0 = self.problem.require_state(zeta0)
+        with limited(self.limits):  # by the turn of the path
+            return self._solve(self.problem.angles.beside(zeta0, path.states[0]), value, path)
+
+    def _solve(self, zeta0: Array, value: float, path: Trajectory) -> SaddleGap:
+        started = time.perf_counter()
         first, second = self._players(path.degree)
         mesh = self._mesh(value, path)
         times = first.times(mesh)
@@ -213,5 +223,6 @@ def saddle_gap(
         If there is no optimum, a response does not converge from any start, or the path has a conjugate
         point.
     """
+    limits = None if settings is None else settings.limits
     optimum = solve(problem, zeta0, settings).direct
-    return BestResponse(problem).solve(optimum.zeta, optimum.value, optimum.trajectory)
+    return BestResponse(problem, limits=limits).solve(optimum.zeta, optimum.value, optimum.trajectory)

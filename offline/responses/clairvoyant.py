@@ -19,13 +19,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...symbolic import RunError
 from ...symbolic.arrays import Array
 from ..direct import PointDerivatives, SecondOrder, Stage, input_errors
+from ..limits import LimitError, Limits, limited
 from ..path import CLAIRVOYANT, GrowingMesh, Trajectory, halved
 from .response import Guess, Responder, Response
 
@@ -50,6 +51,7 @@ class Clairvoyant:
     starts : (s,) cost reached from each start on the first mesh, NaN where IPOPT did not converge
         inside the domain
     rounds : of refinement
+    ended : which limit ended the search before it was over, or nothing
     iterations : of IPOPT, all solves together
     seconds : wall time
     """
@@ -60,6 +62,7 @@ class Clairvoyant:
     second_order: SecondOrder
     starts: Array
     rounds: int
+    ended: str
     iterations: int
     seconds: float
 
@@ -96,6 +99,7 @@ class ClairvoyantSolver:
     mesh : the first, and d of the Radau collocation
     tolerance : relative change of the value at which refinement ends
     rounds : of refinement at most
+    limits : of one solve; one that reaches them gives the best that it has
     compiled : the derivatives, with the disturbance's own numbers in them
     """
 
@@ -109,8 +113,10 @@ class ClairvoyantSolver:
         mesh: GrowingMesh = CLAIRVOYANT,
         tolerance: float = 1e-5,
         rounds: int = 5,
+        limits: Limits | None = None,
         compiled: bool = False,
     ) -> None:
+        self.limits = Limits() if limits is None else limits
         self.stage, self.R = stage, R
         self.tolerance, self.rounds = tolerance, rounds
         self._mesh = mesh.points(horizon, np.array(breaks))
@@ -130,8 +136,12 @@ class ClairvoyantSolver:
         Raises
         ------
         RunError
-            If IPOPT converges from no start; the message holds its last status.
+            If IPOPT converges from no start; the message holds its last status, or the limit.
         """
+        with limited(self.limits) as work:
+            return replace(self._solve(zeta0, policies), ended=work.ended)
+
+    def _solve(self, zeta0: Array, policies: Iterable[Policy]) -> Clairvoyant:
         started = time.perf_counter()
         found, starts, iterations = self._search(zeta0, self._starts(zeta0, policies))
         pair = self._confirmed(zeta0, found)
@@ -140,7 +150,7 @@ class ClairvoyantSolver:
         while pair.error > self.tolerance and rounds < self.rounds and iterations < BUDGET:
             try:
                 finer = self._refined(zeta0, pair)
-            except RunError:
+            except (RunError, LimitError):
                 break  # what was found stays, with its error
             rounds, iterations = (
                 rounds + 1,
@@ -156,6 +166,7 @@ class ClairvoyantSolver:
             second_order=pair.fine.second_order,
             starts=starts,
             rounds=rounds,
+            ended="",
             iterations=iterations,
             seconds=time.perf_counter() - started,
         )
@@ -164,7 +175,7 @@ class ClairvoyantSolver:
         """Return the pair of the cheapest answer that a degree more confirms, else of the cheapest."""
         ordered = sorted(found, key=lambda response: response.cost)
         for coarse in ordered:
-            with suppress(RunError):
+            with suppress(RunError, LimitError):
                 return _Pair(coarse, self._continued(self._fine, zeta0, self._mesh, coarse.path))
         return _Pair(ordered[0], ordered[0], confirmed=False)
 
@@ -190,6 +201,10 @@ class ClairvoyantSolver:
                 failure = error
                 costs.append(np.nan)
                 iterations += PATIENCE
+            except LimitError:
+                if not found:
+                    raise
+                break
             if found and iterations >= BUDGET:
                 break
         if not found:

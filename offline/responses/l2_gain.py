@@ -24,6 +24,7 @@ from ...symbolic.arrays import Array
 from ...symbolic.compiled import dense_function
 from ...symbolic.integration import integrate, runge_kutta_step
 from ..direct import output_cost
+from ..limits import check, count
 from ..path import Domain
 from .policy import ControlPolicy
 
@@ -91,6 +92,7 @@ class GainMeter:
         best = disturbance = self._scaled(self._harmonic(), energy)
         gains = [0.0]
         while len(gains) <= limit:
+            count()
             gradient, output = self._adjoint(disturbance)
             if not np.all(np.isfinite(gradient)):
                 raise RunError(f"the closed loop is lost under a disturbance of energy {energy:g}")
@@ -160,6 +162,7 @@ class GainMeter:
 
         atol = 1e-10 * np.sqrt(energy)
         for d in disturbance:
+            check()
             kernel.inputs[1][...] = d
             rows.append(integrate(rhs, rows[-1], span, rtol=1e-8, atol=atol)[-1])
         states, problem = np.array(rows)[:, :-1], self.problem

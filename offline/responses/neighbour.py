@@ -28,6 +28,7 @@ from ...symbolic import Kernel, Problem
 from ...symbolic.arrays import Array
 from ...symbolic.compiled import dense_function
 from ...symbolic.integration import integrate
+from ..limits import check
 from ..path import Trajectory
 
 
@@ -97,6 +98,7 @@ class NeighbouringOptimum:
         atol = tolerance * 2.0 * np.append(np.outer(root, root), root * size)
         gains = np.empty((len(times), problem.n_inputs, n))
         for i, (left, right) in reversed([*enumerate(pairwise(path.mesh))]):
+            check()
             slope = self._along(path.state_polynomial(i), path.input_polynomial(i))
             inside = np.flatnonzero((times > left) & (times <= right))[::-1]
             stops = np.unique(np.concatenate([[left, right], times[inside]]))[::-1]

@@ -13,6 +13,7 @@ from ...symbolic import RunError
 from ...symbolic.arrays import Array
 from ...symbolic.integration import integrate
 from ..direct import Optimum, PointDerivatives, SecondOrder, Stage, Transcription, second_order
+from ..limits import check
 from ..path import Trajectory
 
 Guess = tuple[Array, Array]
@@ -172,6 +173,7 @@ def reintegrate_response(stage: Stage, zeta0: Array, path: Trajectory, parameter
     rows = [np.append(zeta0, 0.0)]
     atol = 1e-12 * np.append(np.abs(path.states).max() * np.ones(len(zeta0)), 1.0)
     for i, span in enumerate(pairwise(path.mesh)):
+        check()
         rhs = _open_loop(stage, path.input_polynomial(i), parameters[i])
         rows.append(integrate(rhs, rows[-1], np.array(span), rtol=1e-10, atol=atol)[-1])
     return np.array(rows)

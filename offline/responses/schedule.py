@@ -27,6 +27,7 @@ from casadi import SX
 from ...symbolic import Basis, InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import against_control
+from ..limits import EndedByLimitError, Limits, limited
 from ..path import MeshChanges, MeshSettings, Trajectory, aligned_mesh
 from .disturber import Disturber
 from .policy import learned_policy
@@ -90,7 +91,7 @@ class ScheduledWorstCase:
     ----------
     problem, basis : of the policy
     settings : of the mesh, before the jumps are put in, and its Radau points
-    starts, seed, reach : as for `WorstCaseSolver`
+    starts, seed, reach, limits : as for `WorstCaseSolver`
     changes : single settings of the mesh
     """
 
@@ -98,15 +99,18 @@ class ScheduledWorstCase:
         self,
         problem: Problem,
         basis: Basis,
-        settings: MeshSettings = MeshSettings.direct,
+        settings: MeshSettings | None = None,
         *,
         starts: int = 2,
         seed: int = 0,
         reach: float = 4.0,
+        limits: Limits | None = None,
         **changes: Unpack[MeshChanges],
     ) -> None:
         self.problem, self.basis = problem, basis
-        settings = settings.changed(**changes)
+        self.limits = Limits() if limits is None else limits
+        suited = MeshSettings.direct.suited(problem) if settings is None else settings
+        settings = suited.changed(**changes)
         self._mesh = settings.points
         weights = SX.sym("weights", basis.n_basis)
         policy = learned_policy(problem, basis, weights)
@@ -141,8 +145,12 @@ class ScheduledWorstCase:
         drawn = disturber.guesses(zeta0, mesh, lambda t: schedule.at(np.array([t]))[0])
         guesses = chain(drawn, (path.sample(times) for path in tries))
         try:
-            response = disturber.maximise(zeta0, mesh, guesses, schedule.by_interval, fixed=jumps)
-            return measured(disturber, zeta0, response, schedule.by_interval, started)
+            with limited(self.limits):
+                response = disturber.maximise(zeta0, mesh, guesses, schedule.by_interval, fixed=jumps)
+                return measured(disturber, zeta0, response, schedule.by_interval, started)
+        except EndedByLimitError as error:
+            reason = f"no worst case was found: {error}"
+            return unbounded(zeta0, reason, time.perf_counter() - started, ended=True)
         except RunError as error:
             reason = f"the disturbance runs off: {error}"
             return unbounded(zeta0, reason, time.perf_counter() - started)

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
 from ..direct import SecondOrder, against_control
+from ..limits import EndedByLimitError, Limits, limited
 from ..path import MeshChanges, MeshSettings, Trajectory
 from .disturber import ByInterval, Disturber
 from .policy import ControlPolicy, linear_policy
@@ -43,6 +44,7 @@ class WorstCase:
     ----------
     zeta : (n,) initial state
     unbounded : why no finite maximum is reported, or None where there is one
+    ended : whether that is because the limits of the solve were reached
     cost : W(ζ); infinite where unbounded, as are the numbers that follow from it
     path : the worst trajectory, its input the disturbance; None where unbounded
     second_order : whether it is a strict local maximum; None where unbounded
@@ -56,6 +58,7 @@ class WorstCase:
 
     zeta: Array
     unbounded: str | None
+    ended: bool
     cost: float
     path: Trajectory | None
     second_order: SecondOrder | None
@@ -78,26 +81,31 @@ class WorstCaseSolver:
     Parameters
     ----------
     policy : the control policy on the plant of its game
-    settings : of the mesh and its Radau points, as for the direct solver
+    settings : of the mesh and its Radau points; None for those of the direct solver, suited to the
+        closed loop
     starts : perturbed starts, beside no disturbance and the linear worst case
     seed : of the perturbations
     reach : excursion that counts as having run off, in half-widths, or in multiples of the initial
         state where that lies outside
+    limits : of one solve
     changes : single settings of the mesh
     """
 
     def __init__(
         self,
         policy: ControlPolicy,
-        settings: MeshSettings = MeshSettings.direct,
+        settings: MeshSettings | None = None,
         *,
         starts: int = 2,
         seed: int = 0,
         reach: float = 4.0,
+        limits: Limits | None = None,
         **changes: Unpack[MeshChanges],
     ) -> None:
         self.policy, self.problem = policy, policy.problem
-        short = settings.changed(**changes)
+        self.limits = Limits() if limits is None else limits
+        suited = MeshSettings.direct.suited(self.problem) if settings is None else settings
+        short = suited.changed(**changes)
         # the graded mesh of twice the horizon keeps its first intervals with log(2) more grading
         long = MeshSettings(
             horizon=2.0 * short.horizon,
@@ -124,14 +132,17 @@ class WorstCaseSolver:
         """
         started = time.perf_counter()
         zeta0 = self.problem.require_state(zeta0)
-        reason = self.policy.excludes(self.problem.game.gamma)
+        reason, ended = self.policy.excludes(self.problem.game.gamma), False
         if reason is None:
             try:
-                response = self._settled(zeta0)
-                return measured(self._disturber, zeta0, response, _constant(self._level), started)
+                with limited(self.limits):
+                    response = self._settled(zeta0)
+                    return measured(self._disturber, zeta0, response, _constant(self._level), started)
+            except EndedByLimitError as error:
+                reason, ended = f"no worst case was found: {error}", True
             except RunError as error:
                 reason = f"the disturbance runs off: {error}"
-        return unbounded(zeta0, reason, time.perf_counter() - started)
+        return unbounded(zeta0, reason, time.perf_counter() - started, ended=ended)
 
     def attenuation(self, worst: WorstCase, bias: float, *, rounds: int = 20) -> float:
         """Return the L2 gain achieved from ζ_0 with a bias, normally V*(ζ_0) [-].
@@ -207,6 +218,7 @@ def measured(
     return WorstCase(
         zeta=zeta0,
         unbounded=None,
+        ended=False,
         cost=-response.cost,
         path=path,
         second_order=response.second_order,
@@ -220,11 +232,12 @@ def measured(
     )
 
 
-def unbounded(zeta0: Array, reason: str, seconds: float) -> WorstCase:
-    """Return that no finite worst case is known from a state."""
+def unbounded(zeta0: Array, reason: str, seconds: float, *, ended: bool = False) -> WorstCase:
+    """Return that no finite worst case is known from a state; `ended` if a limit is the reason."""
     return WorstCase(
         zeta=zeta0,
         unbounded=reason,
+        ended=ended,
         cost=np.inf,
         path=None,
         second_order=None,

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from ...symbolic import InputError, Problem, RunError
 from ...symbolic.arrays import Array
 from ...symbolic.game import gamma_threshold
+from ..limits import LimitError, Limits, limited
 from ..path import MeshSettings
 from ..settings import OfflineSettings, horizon_of
 from .saddle import SaddleSolution, SaddleSolver
@@ -86,6 +87,7 @@ class GammaCurveSolver:
     gammas : finite levels; None for 12 whose distances to the threshold grow geometrically
     horizon : T [s] at least; longer where the closed loop is slow
     compiled : as for the saddle solver
+    limits : of one curve; the levels that are left then are faults
 
     Raises
     ------
@@ -100,8 +102,10 @@ class GammaCurveSolver:
         *,
         horizon: float = MeshSettings.saddle.horizon,
         compiled: bool = True,
+        limits: Limits | None = None,
     ) -> None:
         self.problem = problem
+        self.limits = Limits() if limits is None else limits
         levels = default_gammas(problem) if gammas is None else sorted({float(g) for g in gammas})
         if not levels or not np.all(np.isfinite(levels)):
             raise InputError("give at least one level of gamma, each a finite number")
@@ -119,7 +123,8 @@ class GammaCurveSolver:
             If the state is not n finite numbers inside the domain.
         """
         starts = self.problem.starts(zeta0)
-        curves = [self._from(start) for start in starts]
+        with limited(self.limits):
+            curves = [self._from(start) for start in starts]
         points, limits = (list(each) for each in zip(*curves, strict=True))
         least = [min(turns, key=_value) for turns in zip(*points, strict=True)]
         return GammaCurve(starts[0], self.problem.gamma_star, least, min(limits, key=_value))
@@ -142,7 +147,7 @@ class GammaCurveSolver:
         slow = solver.with_horizon(max(solver.settings.horizon, HORIZON / problem.decay_rate))
         try:
             solution, _ = slow.solve_aligned(zeta0, start=start)
-        except RunError as error:
+        except (RunError, LimitError) as error:
             return GammaPoint(gamma, np.nan, linear, np.nan, str(error)), None
         return GammaPoint(gamma, solution.value, linear, solution.slope), solution
 
@@ -178,5 +183,7 @@ def gamma_curve(
     InputError
         As `GammaCurveSolver` and its `solve`.
     """
-    horizon = horizon_of(problem, OfflineSettings() if settings is None else settings)
-    return GammaCurveSolver(problem, gammas, horizon=horizon).solve(problem.initial_state(zeta0))
+    asked = OfflineSettings() if settings is None else settings
+    horizon = horizon_of(problem, asked)
+    solver = GammaCurveSolver(problem, gammas, horizon=horizon, limits=asked.limits)
+    return solver.solve(problem.initial_state(zeta0))

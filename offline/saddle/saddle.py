@@ -18,6 +18,7 @@ import numpy as np
 
 from ...symbolic import Problem, RunError
 from ...symbolic.arrays import Array
+from ..limits import count
 from ..path import Domain, GaussRule, MeshChanges, MeshSettings, Plant, interpolate, settle
 from .boundary import BoundaryProblem, Unknowns
 from .extremal_field import ExtremalField
@@ -203,6 +204,7 @@ class SaddleSolver:
         """Return the root, or None where Newton's method does not converge, and its iterations."""
         lengths = np.diff(mesh)
         for iteration in range(1, limit + 1):
+            count()
             try:
                 # a step too far, to where the model is singular, shows in its size
                 with np.errstate(over="ignore", invalid="ignore", divide="ignore"):

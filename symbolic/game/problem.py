@@ -222,6 +222,11 @@ class Problem:
         """Rate of the slowest mode of the linearised game's closed loop [1/s], positive."""
         return -float(self.closed_loop_modes.real.max())
 
+    @property
+    def fastest_rate(self) -> float:
+        """Magnitude of the fastest mode of the linearised game's closed loop [1/s]."""
+        return float(np.abs(self.closed_loop_modes).max())
+
     @cached_property
     def gamma_star(self) -> float:
         """Smallest attenuation level γ* of the linearised game [-]."""
