@@ -215,6 +215,15 @@ def test_a_clairvoyant_search_ends_with_the_best_that_it_has() -> None:
         pushed(Limits(max_iterations=1)).solve(START, starts())
 
 
+@pytest.fixture
+def heeded() -> Iterator[None]:
+    """Ctrl-C is heeded, also where the tests were started in the background, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heeded")
 def test_ctrl_c_inside_ipopt_is_ctrl_c(reference_problem: Problem) -> None:
     """CasADi makes a failure of IPOPT of it, after which a search would try its next start."""
     direct = DirectSolver(reference_problem, n_intervals=60, degree=5, method="ipopt")

@@ -155,13 +155,16 @@ def test_a_regret_that_no_policy_can_have_is_a_fault() -> None:
     assert below_optimum(-1e-6, 2e-6) is None
     assert "-1.0e-06" in str(below_optimum(-1e-6, 1e-7))
     good = {"run": 0, "policy": "learned", "failed": False, "regret": 1e-4, "regret_error": 1e-6}
+    good |= {"unlearned": ""}
     bad, failed = good | {"run": 1, "regret": -1e-4}, good | {"failed": True, "regret": -1.0}
     unknown = good | {"regret": None, "regret_error": None}
     (fault,) = faults([good, bad, failed, unknown])
     assert fault.startswith("run 1, learned: its regret is -1.0e-04")
+    (fault,) = faults([good, good | {"run": 2, "unlearned": "nothing was learned"}])
+    assert fault == "run 2, learned: nothing was learned"
     many = faults([bad] * 25)
     assert len(many) == 21
-    assert many[-1] == "5 more runs have such a regret"
+    assert many[-1] == "5 more runs have faults of these kinds"
 
 
 def test_a_sweep_with_a_wrong_optimum_says_so(

@@ -34,7 +34,8 @@ class SweepResult:
     runs, failed, resumed : how many were asked for, failed, and were there already
     table, csv : the rows of all runs
     summary : for each setting and policy the quantiles over its runs
-    faults : runs whose regret no policy can have: their optimum or their cost is wrong
+    faults : runs whose regret no policy can have (their optimum or their cost is wrong), and those that
+        learned nothing although it was due
     seconds : wall time
     """
 

@@ -152,7 +152,7 @@ class Sweep:
         problem = self.plan.scenario.setup().problem
         states = zip(problem.state_names, problem.state_units, strict=True)
         columns |= {f"initial_{name}": unit for name, unit in states}
-        return columns | FIGURES | {"failed": "1", "reason": None, "record": None}
+        return columns | FIGURES | {"failed": "1", "reason": None, "unlearned": None, "record": None}
 
     def _keep(self, run: Run, row: dict[str, Any], record: bytes | None, lost: bool = False) -> None:
         """Put a run's record in place, then its line."""

@@ -26,7 +26,7 @@ from ..scenario import Scenario
 from .vary import Choices, Range, varied
 
 Sampling = Literal["random", "latin", "sobol"]
-ROWS = 2  # raise it when the figures of a row, or how they are made, change
+ROWS = 3  # raise it when the figures of a row, or how they are made, change
 FILES = ("vehicle", "problem", "simulation.plant", "basis.name", "learner.weights", "learner.rule")
 
 

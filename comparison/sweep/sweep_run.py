@@ -101,7 +101,7 @@ def lost_row(run: Run, scenario: Scenario, reason: str) -> dict[str, Any]:
     states = {f"initial_{name}": value for name, value in zip(names, zeta, strict=True)}
     head = {"run": run.number, "policy": run.policy, "state": run.state}
     row: dict[str, Any] = head | run.settings | states
-    return row | dict.fromkeys(FIGURES) | {"failed": True, "reason": reason}
+    return row | dict.fromkeys(FIGURES) | {"failed": True, "reason": reason, "unlearned": ""}
 
 
 class _Setups:
@@ -159,6 +159,7 @@ def _figures(record: xr.Dataset, setup: Setup, value: QuickValue) -> dict[str, A
     row |= {name: found[name] for name in FIGURES if name in found}
     if found["regret"] is not None:
         row["regret_error"] = QuickValue.error + found["cost_error"]
+    row["unlearned"] = found["unlearned"] or ""
     row["fallback"] = float(fallback.mean()) if len(fallback) else None
     row["ended"] = float(time_axis[-1]) if len(time_axis) else None
     if disturbed and len(zeta) and not row["reason"]:

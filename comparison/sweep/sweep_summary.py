@@ -80,15 +80,20 @@ def summary(rows: Iterable[Mapping[str, Any]], settings: Sequence[str]) -> list[
 
 
 def faults(rows: Iterable[Mapping[str, Any]], most: int = 20) -> list[str]:
-    """Return the runs whose regret no policy can have, the first `most` and how many more there are."""
+    """Return the runs whose regret no policy can have and those that learned nothing though it was due.
+
+    The first `most` of them, and how many more there are.
+    """
     found, more = list[str](), 0
     for row in rows:
-        fault = None if row["failed"] else below_optimum(row["regret"], row["regret_error"] or 0.0)
-        if fault is not None and len(found) < most:
+        if row["failed"]:
+            continue
+        fault = below_optimum(row["regret"], row["regret_error"] or 0.0) or row["unlearned"]
+        if fault and len(found) < most:
             found.append(f"run {row['run']}, {row['policy']}: {fault}")
-        elif fault is not None:
-            more += 1
-    return [*found, f"{more} more runs have such a regret"] if more else found
+        more += bool(fault)
+    more -= len(found)
+    return [*found, f"{more} more runs have faults of these kinds"] if more else found
 
 
 def _ratio(one: Regret, other: Regret) -> dict[str, float | None]:
