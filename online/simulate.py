@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from ..symbolic import InputError, Problem
@@ -13,6 +12,9 @@ from ..symbolic.arrays import Array
 from ..symbolic.toml import validate
 from .loop import Disturbance, FunctionPolicy, Policy, ProblemSystem, Progress, RunSettings, drive
 from .records import to_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def simulate(

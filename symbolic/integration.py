@@ -1,4 +1,7 @@
-"""Integration with error control that always ends: scipy's methods with a limit on the calls."""
+"""Integration with error control that always ends: scipy's methods with a limit on the calls.
+
+`import scipy` here and elsewhere loads its parts when they are first used.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,8 @@ from typing import Literal, TypeVar
 
 import casadi
 import numpy as np
-import scipy.linalg
+import scipy
 from casadi import MX, SX
-from scipy.integrate import DOP853, solve_ivp
 
 from .arrays import Array
 from .errors import RunError
@@ -32,12 +34,13 @@ def dormand_prince_step(rate: Callable[[MX], MX], y: MX, h: MX) -> tuple[MX, MX,
     The method of order 8 of Dormand and Prince with its embedded ones of order 5 and 3 (Hairer, Nørsett
     and Wanner 1993, sec. II.10), scipy's coefficients; for a rate that does not depend on time.
     """
+    method = scipy.integrate.DOP853
     slopes = [rate(y)]
-    for row in DOP853.A[1 : DOP853.n_stages]:
+    for row in method.A[1 : method.n_stages]:
         slopes.append(rate(y + h * _combined(row, slopes)))
-    end = y + h * _combined(DOP853.B, slopes)
+    end = y + h * _combined(method.B, slopes)
     slopes.append(rate(end))
-    return end, _combined(DOP853.E5, slopes), _combined(DOP853.E3, slopes)
+    return end, _combined(method.E5, slopes), _combined(method.E3, slopes)
 
 
 def _combined(coefficients: Array, slopes: list[MX]) -> MX:
@@ -94,7 +97,7 @@ def integrate(
         return rhs(t, y)
 
     span = (float(times[0]), float(times[-1]))
-    answer = solve_ivp(
+    answer = scipy.integrate.solve_ivp(
         counted, span, start, method, t_eval=times[1:], rtol=rtol, atol=atol, first_step=first_step
     )
     if not answer.success or not np.all(np.isfinite(answer.y)):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...symbolic import InputError, Problem
 from ...symbolic.arrays import Array
@@ -15,6 +14,9 @@ from ..learning import MonitorSample
 from ..loop import History
 from ..vehicle import VehicleHistory
 from .files import load, versions
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 PLAYERS = ("control", "disturbance")
 OVER_TIME = ("time", "zeta", "u_control", "disturbance", "cost", "attenuated")
@@ -69,6 +71,8 @@ def to_dataset(history: History, provenance: dict[str, Any]) -> xr.Dataset:
     }
     if history.remembered is not None:
         data["remembered"] = (("basis",), history.remembered, {"units": "cost"})
+    import xarray as xr  # takes a third of the time to load a controller
+
     return _with_vehicle(xr.Dataset(data, coordinates, attributes), history)
 
 

@@ -131,7 +131,7 @@ def max_difference(first: Kernel, second: Kernel, n_points: int = 20, seed: int 
         arguments = [rng.uniform(-1.0, 1.0, array.shape) for array in first.inputs]
         results = first(*arguments)
         for _ in range(MOST_SHRINKS):
-            if all(np.isfinite(result @ result) for result in map(np.ravel, results)):
+            if all(np.isfinite(result).all() for result in results):
                 break
             arguments = [0.1 * argument for argument in arguments]
             results = first(*arguments)

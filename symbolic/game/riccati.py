@@ -19,7 +19,7 @@ indefinite, X_1 may become singular before: P escapes, a conjugate point at infi
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
+import scipy
 
 from ..arrays import Array
 from ..errors import GammaTooSmallError, InputError

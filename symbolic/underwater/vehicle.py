@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import scipy.optimize
+import scipy
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ..arrays import Array, Vector3
