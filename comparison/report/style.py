@@ -103,7 +103,7 @@ class Page:
         engine = sheet.get_layout_engine()
         assert engine is not None
         engine.execute(sheet)
-        sheet.set_layout_engine("none")  # or every file would find the layout again
+        sheet.set_layout_engine(None)  # or every file would be drawn twice, once to find the layout again
         buffer = io.BytesIO()
         sheet.savefig(buffer, format="png")
         self.pictures[name] = buffer.getvalue()
