@@ -103,7 +103,7 @@ class Page:
         engine = sheet.get_layout_engine()
         assert engine is not None
         engine.execute(sheet)
-        sheet.set_layout_engine(None)  # or every file would be drawn twice, once to find the layout again
+        sheet.set_layout_engine(None)  # or it would be sought again for every file
         buffer = io.BytesIO()
         sheet.savefig(buffer, format="png")
         self.pictures[name] = buffer.getvalue()
