@@ -147,7 +147,7 @@ def test_values(old: str, new: str, words: list[str], tmp_path: Path, one_senten
         ("[6.36, 0.0", "[6.36, 0.5", ["added_mass", "symmetric", "0.5", "mean"]),
         ("[[0.26, 0.0", "[[0.26, 0.1", ["inertia", "symmetric", "0.1"]),
         ("[[0.26", "[[-0.26", ["rigid-body inertia", "positive definite", "-0.26"]),
-        ("[6.36", "[-20.0", ["M (rigid body and added mass)", "positive definite", "-6.5"]),
+        ("[6.36", "[-20.0", ["added_mass", "-20", "SNAME", "-(X_udot"]),
         (
             CENTER,
             "center_of_gravity = [0.0, 0.0, 0.5]",  # m z^2 = 3.4 kg m^2 exceeds the inertia about CO

@@ -16,7 +16,9 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ..arrays import Array, Vector3
 from ..toml import Settings, locate, read_toml, validate
+from .plausible import why_implausible
 
+AXES = ("X (surge)", "Y (sway)", "Z (heave)", "K (roll)", "M (pitch)", "N (yaw)")
 Positive = Annotated[float, Field(gt=0.0, strict=True)]
 
 
@@ -45,11 +47,12 @@ class Thrusters(Settings):
     def _rank(cls, rows: list[list[float]]) -> list[list[float]]:
         if len(rows) != 6 or len({len(row) for row in rows}) != 1:
             raise ValueError("the allocation must have 6 rows (X Y Z K M N) of equal length")
-        rank = int(np.linalg.matrix_rank(np.array(rows), tol=1e-6))
-        if rank < 6:
+        undriven = _undriven(np.array(rows))
+        if undriven:
             raise ValueError(
-                f"the allocation has rank {rank}, but station keeping of six degrees of freedom "
-                "needs rank 6; underactuated vehicles are not covered"
+                f"these {len(rows[0])} thrusters can't drive {' and '.join(undriven)} by itself (rank "
+                f"{6 - len(undriven)}), but station keeping of six degrees of freedom needs rank 6; "
+                "add or turn thrusters, or leave the thrusters out and command wrenches"
             )
         return rows
 
@@ -177,6 +180,9 @@ class Vehicle(Settings):
                 "the rigid-body inertia must be positive definite, but its smallest eigenvalue is "
                 f"{smallest:.4g}; check mass, inertia (about CO) and center_of_gravity"
             )
+        fault = why_implausible(self)
+        if fault is not None:
+            raise ValueError(fault)
         smallest = float(np.linalg.eigvalsh(self.M).min())
         if smallest <= 0.0:
             raise ValueError(
@@ -222,6 +228,23 @@ class Vehicle(Settings):
     def D_quadratic(self) -> Array:
         """D_q of D(ν) = D_l + D_q diag(|ν|), shape (6, 6)."""
         return _as_matrix(self.quadratic_damping)
+
+
+def _undriven(allocation: Array) -> list[str]:
+    """Return the axes that lack a thruster: for each wrench that none can give its largest share.
+
+    Moments count at arms of the mean length there is, so that they compare with forces.
+    """
+    arms = np.linalg.norm(allocation[3:], axis=0)
+    length = float(arms[arms > 0.0].mean()) if arms.any() else 1.0
+    rows = allocation / np.repeat([1.0, length], 3)[:, None]
+    wrenches, sizes, _ = np.linalg.svd(rows)
+    sizes = np.append(sizes, np.zeros(6 - len(sizes)))
+    missing = np.abs(wrenches[:, sizes <= 1e-6])
+    found = list[int]()
+    for shares in missing.T:
+        found.append(max(set(range(6)) - set(found), key=lambda axis: round(float(shares[axis]), 9)))
+    return [AXES[axis] for axis in sorted(found)]
 
 
 def _as_matrix(value: list[float] | list[list[float]]) -> Array:
