@@ -57,6 +57,18 @@ def test_lines_are_found_by_their_keys_and_the_last_one_counts(tmp_path: Path) -
     again.close()
 
 
+def test_lines_that_were_added_are_found_when_it_is_read_again(tmp_path: Path) -> None:
+    """As after Ctrl-C between a line and what is known of it."""
+    journal = Journal(written(tmp_path / "journal", 2))
+    place = journal.add(line(2, 2.0))
+    assert found(journal, 0, 2) == [0.0, None]
+    journal.read_again()
+    assert found(journal, 0, 1, 2) == [0.0, 1.0, 2.0]
+    assert [*journal.offsets([key(2)])] == [place]
+    assert journal.add(line(3, 3.0)) > place
+    journal.close()
+
+
 def test_wherever_a_kill_tears_the_last_line(tmp_path: Path) -> None:
     whole = written(tmp_path / "whole", 3).read_bytes()
     path = tmp_path / "torn"

@@ -143,6 +143,7 @@ def _all_runs(going: Sweep, execute: Execute, told: Stage) -> int:
         going.go(execute, lambda done, made: told("sweep", done, made, of))
     except (KeyboardInterrupt, StationkeepError):
         with suppress(InputError):
+            going.take_added()
             going.write_tables()
         raise
     told("tables", 0, 0, of)

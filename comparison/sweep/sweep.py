@@ -77,6 +77,14 @@ class Sweep:
             progress(number + 1, number + 1)
         return self.n_finished
 
+    def take_added(self) -> None:
+        """Take the lines that were added, but not noted, when Ctrl-C came."""
+        self.journal.read_again()
+        keys = (self.plan.run(number).key for number in range(len(self.plan)))
+        for number, place in enumerate(self.journal.offsets(keys)):
+            if self.places[number] < 0:
+                self.places[number] = place
+
     @property
     def n_finished(self) -> int:
         """Number of runs that are finished."""

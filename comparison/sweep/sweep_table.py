@@ -85,6 +85,12 @@ class Journal:
             raise self._unwritable(error) from None
         return offset
 
+    def read_again(self) -> None:
+        """Find the lines anew: an interrupt may have come between a line and what is known of it."""
+        self._file.flush()
+        self._keys, self._offsets = array("Q"), array("q")
+        self._read()
+
     def at(self, offset: int) -> dict[str, Any]:
         """Return the line that is there."""
         self._file.seek(offset)
