@@ -4,7 +4,7 @@ from .clairvoyant import KIND, clairvoyant_record, optimum_name
 from .provenance import FORMAT, OFFLINE_KEY, model_text, provenance
 from .recorded import recorded_scenario
 from .replay import BIT_EQUAL, DIFFERENT, Replay, replay
-from .running import closed_loop
+from .running import closed_loop, require_runnable
 from .runs import (
     contender_record,
     online_record,
@@ -36,6 +36,7 @@ __all__ = [
     "provenance",
     "recorded_scenario",
     "replay",
+    "require_runnable",
     "reused",
     "trajectory_of",
 ]

@@ -6,8 +6,18 @@ from typing import cast
 
 from ...online import History, LearnedPolicy, Policy, VehiclePolicy, run
 from ...online.loop import ProblemSystem, Progress, drive, require_held
+from ...online.vehicle import require_trim
+from ...symbolic import StationKeeping
 from ..policies import AnyPolicy
 from ..scenario import Scenario
+
+
+def require_runnable(scenario: Scenario) -> None:
+    """Raise InputError where the period can't hold the game, or the thrusters the vehicle."""
+    setup = scenario.setup()
+    require_held(setup.problem, scenario.simulation.control_period)
+    if isinstance(setup, StationKeeping):
+        require_trim(setup)
 
 
 def closed_loop(
@@ -18,9 +28,9 @@ def closed_loop(
     Raises
     ------
     InputError
-        If the control period can't hold the game.
+        As `require_runnable`.
     """
-    require_held(scenario.setup().problem, scenario.simulation.control_period)
+    require_runnable(scenario)
     if scenario.problem is None:
         return run(scenario, cast("VehiclePolicy | None", policy), progress)
     setup = scenario.setup()

@@ -10,11 +10,11 @@ import numpy as np
 import xarray as xr
 
 from ...online import draw_samples, load
-from ...online.loop import require_held
 from ...symbolic import RunError, Setup
 from ..merit import Regret, RunMetrics
 from ..optima import Ideal
 from ..policies import label_of
+from ..records import require_runnable
 from ..scenario import Scenario
 from ..theory import Condition, Theory, run_conditions, scenario_conditions, theory
 from .analysis import Field, analysis_record, ideal_of
@@ -157,12 +157,12 @@ def compared(
     Raises
     ------
     InputError
-        If the control period can't hold the game.
+        As `require_runnable`.
     RunError
         If the offline solver does not converge from the scenario's own state, or a worker was lost.
     """
     setup = scenario.setup()
-    require_held(setup.problem, scenario.simulation.control_period)
+    require_runnable(scenario)
     made = make_all(scenarios_from(scenario, n_states), own, folder, n_workers, tell)
     if made.optima[OPTIMUM][0].value is None:
         raise RunError(made.optima[OPTIMUM][0].fault)

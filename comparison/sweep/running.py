@@ -10,11 +10,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from ...online.loop import require_held
 from ...online.records import writable_folder
 from ...symbolic import InputError, StationkeepError
 from ...symbolic.arrays import Array
 from ..parallel import Event, default_workers, locked, run_on_cluster, run_tasks
+from ..records import require_runnable
 from ..scenario import Scenario
 from .sweep import Execute, Setup, Sweep
 from .sweep_plan import Plan, Run, Sampling
@@ -97,7 +97,7 @@ def sweep(
     """
     started = time.monotonic()
     one = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
-    require_held(one.setup().problem, one.simulation.control_period)
+    require_runnable(one)
     told = progress if progress is not None else _silent
     bench = WorkerSettings(one, records, every)
     asked = [f"envelope.scale={','.join(map(str, scales))}"] if len(scales) else []

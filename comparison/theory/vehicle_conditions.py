@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...online.vehicle import shown_trim, trim_share
 from ...symbolic import StationKeeping
 from .condition import Condition
 
 
 def vehicle_conditions(station: StationKeeping, pitch_limit: float) -> list[Condition]:
-    """Return Assumption 1 and Property 1 of a vehicle whose runs end at a pitch [deg]."""
-    return [_pitch(pitch_limit), *_inertia(station, pitch_limit)]
+    """Return Assumption 1, Property 1 and the trim of a vehicle whose runs end at a pitch [deg]."""
+    return [_pitch(pitch_limit), *_inertia(station, pitch_limit), *trim_condition(station)]
 
 
 def _pitch(limit: float) -> Condition:
@@ -61,6 +62,24 @@ def inertia_bounds(station: StationKeeping, pitch_limit: float) -> tuple[float, 
             eigenvalues = np.linalg.eigvalsh(kernel(zeta)[0])
             low, high = min(low, float(eigenvalues[0])), max(high, float(eigenvalues[-1]))
     return low, high
+
+
+def trim_condition(station: StationKeeping) -> list[Condition]:
+    """Return whether the thrusters can hold the vehicle at its station; nothing without thrusters."""
+    share = trim_share(station)
+    if share is None:
+        return []
+    return [
+        Condition(
+            "the thrusters can hold the trim",
+            "not in the paper",
+            share,
+            1.0,
+            share < 1.0,
+            f"least share of their limits that gives u_trim = {shown_trim(station)}; the rest is left "
+            "for control",
+        )
+    ]
 
 
 def vehicle_equilibrium(station: StationKeeping) -> Condition:

@@ -1,6 +1,6 @@
 """A vehicle in closed loop: controller, plant, disturbance, sensors and thrusters."""
 
-from .allocation import Allocation, Allocator
+from .allocation import Allocation, Allocator, require_trim, shown_trim, trim_share
 from .controller import Controller
 from .disturbance import Disturbance, KnownSource, build_disturbance
 from .history import VehicleHistory
@@ -26,5 +26,8 @@ __all__ = [
     "VehiclePolicy",
     "build_disturbance",
     "held_rates",
+    "require_trim",
     "run",
+    "shown_trim",
+    "trim_share",
 ]

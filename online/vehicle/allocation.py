@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ...symbolic import InputError, RunError, Vehicle
+from ...symbolic import InputError, RunError, StationKeeping, Vehicle
 from ...symbolic.arrays import Array
 
 RIDGE = 1e-8  # ε
@@ -33,6 +33,28 @@ class Allocation:
     thrust: Array
     wrench: Array
     saturated: bool
+
+
+def trim_share(station: StationKeeping) -> float | None:
+    """Return the least share of the thrusters' limits that holds the trim; None without thrusters."""
+    thrusters = station.model.vehicle.thrusters
+    return None if thrusters is None else thrusters.least_share(station.model.u_trim)
+
+
+def shown_trim(station: StationKeeping) -> str:
+    """Return the trim in words, to a tenth."""
+    return f"[{', '.join(f'{x:g}' for x in np.round(station.model.u_trim, 1) + 0.0)}] N, N m"
+
+
+def require_trim(station: StationKeeping) -> None:
+    """Raise InputError where the thrusters can't hold the vehicle at its station."""
+    share = trim_share(station)
+    if share is not None and share >= 1.0:
+        raise InputError(
+            f"vehicle '{station.model.vehicle.name}' needs a steady {shown_trim(station)} at its "
+            f"station, {share:.2g} times what its thrusters can give; correct weight, buoyancy, their "
+            "centres or the current"
+        )
 
 
 class Allocator:

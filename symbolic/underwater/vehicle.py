@@ -72,6 +72,24 @@ class Thrusters(Settings):
         """Return the least-norm thrusts [N] that give the body wrench; shape (..., n_thrusters)."""
         return tau_b @ np.linalg.pinv(self.matrix).T
 
+    def least_share(self, tau_b: Array) -> float:
+        """Return the least s for which thrusts within s times the limits give the body wrench (6,).
+
+        The linear program min s with B T = τ_b and s T_min <= T <= s T_max; above 1 they can't.
+        """
+        matrix, n = self.matrix, len(self.allocation[0])
+        reverse, forward = self.limits
+        eye, one = np.eye(n), np.ones((n, 1))
+        answer = scipy.optimize.linprog(
+            np.append(np.zeros(n), 1.0),
+            A_ub=np.block([[eye, -forward * one], [-eye, reverse * one]]),
+            b_ub=np.zeros(2 * n),
+            A_eq=np.column_stack([matrix, np.zeros(6)]),
+            b_eq=tau_b,
+            bounds=[(None, None)] * n + [(0.0, None)],
+        )
+        return np.inf if answer.x is None else float(answer.x[-1])
+
     def power(self, thrust: Array) -> Array | None:
         """Return the electrical power of all thrusters together, shape (...,) [W].
 
