@@ -20,6 +20,7 @@ def user_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_curves_in_the_json_and_a_figure(tmp_path: Path, capsys: Capture) -> None:
     options = ("--gammas", "5,1.2,2", "--json", "--quiet", "--out", "there")
     answer = call(capsys, "offline", *STATES, *SETTINGS, *options)

@@ -69,6 +69,7 @@ def test_ctrl_c_during_online(user_folder: Path) -> None:
         assert record["critic"].shape == (record.sizes["learn_time"], 78)
 
 
+@pytest.mark.slow
 def test_ctrl_c_during_compare_keeps_the_finished_records(user_folder: Path) -> None:
     records = user_folder / "out" / "records"
     answer = interrupted(

@@ -100,6 +100,7 @@ def assert_equal(folder: str, reference: str) -> None:
         np.testing.assert_allclose(*numbers, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_killed_and_resumed_with_a_worker_lost(
     user_folder: Path, capsys: Capture, started: list[Run]
 ) -> None:
@@ -182,6 +183,7 @@ def test_states_that_fail_are_rows_and_the_others_are_solved(
     assert (again.code, again.out) == (1, answer.out)
 
 
+@pytest.mark.slow
 def test_ctrl_c_stops_the_workers_and_keeps_whole_records(
     user_folder: Path, started: list[Run]
 ) -> None:

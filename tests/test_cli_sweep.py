@@ -75,6 +75,7 @@ def test_rows_are_the_runs_that_were_asked_for(user_folder: Path, capsys: Captur
     assert groups == {(scale, name) for scale in (0.1, 0.5) for name in ("learned", "linear")}
 
 
+@pytest.mark.slow
 def test_a_longer_sweep_keeps_what_a_shorter_one_made(user_folder: Path, capsys: Capture) -> None:
     """And a corrupted or missing record, or a lost journal line, costs that run only."""
     first = call(capsys, *WORDS, "--states", "2")

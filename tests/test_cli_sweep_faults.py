@@ -45,6 +45,7 @@ def assert_as_undisturbed(states: int, folder: Path, capsys: Capture) -> None:
     assert not [name for name in files_in(folder) if Path(name).name.startswith(".")]
 
 
+@pytest.mark.slow
 def test_killed_and_resumed_with_a_worker_lost(
     user_folder: Path, capsys: Capture, started: list[Started]
 ) -> None:
@@ -84,6 +85,7 @@ def test_killed_at_random_moments_again_and_again(
     assert_as_undisturbed(16, user_folder, capsys)
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_whole_results(user_folder: Path, started: list[Started]) -> None:
     """As a terminal does it: the whole group is told."""
     sweep = Started("out", "--states", "50", "--workers", "2")

@@ -255,6 +255,7 @@ def test_states_without_certificate_are_left_out(tmp_path: Path) -> None:
         certified_pairs(failing, {})
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     words = ("offline", "--quiet", "--ideal-weights", "14", "--held-out", "3", "--workers", "1")

@@ -97,6 +97,7 @@ class Told:
         return [failure or message for number, message, failure in self.events if number == task]
 
 
+@pytest.mark.slow
 def test_workers_do_all_tasks_and_others_do_those_of_the_dead(tmp_path: Path) -> None:
     told = Told(tmp_path, 2, "fine 1", "kill", "fine 2", "once", "threads", "fine 3")
     pids = [told.of(task)[0] for task in (0, 2, 5)]

@@ -185,6 +185,7 @@ def test_studies_do_not_load_the_command_line(tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
+@pytest.mark.slow
 def test_workers_load_the_studies(tmp_path: Path) -> None:
     """Processes that are spawned find what lies in the folder of a script, and keep what they made."""
     script = tmp_path / "script.py"

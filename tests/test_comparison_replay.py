@@ -85,6 +85,7 @@ def test_every_contender_runs_again(name: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(answer.record["tau_b"], made["tau_b"])
 
 
+@pytest.mark.slow
 def test_the_files_that_a_scenario_named_may_be_gone(record: Path, tmp_path: Path) -> None:
     """Vehicle, driven vehicle, basis and weights are in the record; nothing is read but the record."""
     files = tmp_path / "files"
@@ -130,6 +131,7 @@ def test_an_optimum_runs_again(tmp_path: Path) -> None:
     assert {"zeta", "costate", "value", "node", "mesh", "faults"} <= set(answer.differences)
 
 
+@pytest.mark.slow
 def test_an_optimum_that_started_from_another_needs_it(tmp_path: Path) -> None:
     scenario = Scenario.load("bluerov2-heavy", [*QUICK, *ROUGH])
     states = scenario.initial_state * np.array([[1.0], [1.001]])

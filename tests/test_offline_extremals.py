@@ -29,6 +29,7 @@ def on_axis(problem: Problem, axis: int) -> Problem:
     return Problem("on an axis", zeta, drift[keep], g[keep, axis], reduced, scale, switching=zeta[1])
 
 
+@pytest.mark.slow
 @AXES
 def test_mirror_pair_lies_below_the_symmetric_extremal(
     reference_problem: Problem, axis: int, distance: float

@@ -55,6 +55,7 @@ def assert_pass(names: list[str], only: str, env: dict[str, str]) -> None:
     assert "passed" in done.stdout
 
 
+@pytest.mark.slow
 def test_every_module_is_imported(elsewhere: dict[str, str], tmp_path: Path) -> None:
     names = [
         ".".join(["stationkeep", *path.relative_to(ROOT).with_suffix("").parts]) for path in SOURCES
@@ -67,6 +68,7 @@ def test_every_module_is_imported(elsewhere: dict[str, str], tmp_path: Path) -> 
     assert int(done.stdout) == len(SOURCES)
 
 
+@pytest.mark.slow
 def test_locks(elsewhere: dict[str, str]) -> None:
     """One holder, known by its number; a dead one is followed; nothing but a lock is touched."""
     assert_pass(["test_comparison_lock.py"], "slow or not slow", elsewhere)
