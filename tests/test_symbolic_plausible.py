@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stationkeep.symbolic import InputError, Vehicle
-from stationkeep.symbolic.underwater.plausible import CORE, REACH, central_inertia, unit_length
+from stationkeep.symbolic.underwater.plausible import CORE, REACH
 
 CASES = Path(__file__).parent / "cases"
 PUBLISHED = ("girona500", "lauv", "micro-auv", "saga", "videoray")
@@ -46,7 +46,7 @@ def test_the_number_and_its_bound_are_named(name: str, one_sentence: Check) -> N
 def test_published_vehicles_are_far_from_the_bounds(name: str) -> None:
     """Nothing of them is within a factor of two of a bound."""
     vehicle = Vehicle.load(CASES / "vehicles" / f"{name}.toml" if name in PUBLISHED else name)
-    unit, moments = unit_length(vehicle), np.linalg.eigvalsh(central_inertia(vehicle))
+    unit, moments = vehicle.body.unit, np.linalg.eigvalsh(vehicle.body.central_inertia)
     radii = np.sqrt(moments / vehicle.mass)
     assert 2.0 * CORE * unit < radii.min() <= radii.max() < 0.5 * REACH * unit
     assert moments[2] < moments[0] + moments[1]
@@ -70,7 +70,7 @@ def test_the_triangle_holds_at_the_centre_of_gravity_not_at_the_origin() -> None
     moved = vehicle.replaced(
         {"center_of_gravity": r.tolist(), "inertia": (about_center + steiner).tolist()}, "moved"
     )
-    assert central_inertia(moved) == pytest.approx(about_center, abs=1e-12)
+    assert moved.body.central_inertia == pytest.approx(about_center, abs=1e-12)
     flat = np.diag([0.1, 0.2, 0.35]) + steiner
     with pytest.raises(InputError, match="sum of the other two"):
         vehicle.replaced({"center_of_gravity": r.tolist(), "inertia": flat.tolist()}, "flat")

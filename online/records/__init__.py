@@ -1,8 +1,6 @@
 """The record of a run, and files that are written whole."""
 
 from .files import (
-    load,
-    read_parts,
     remove_temporaries,
     save,
     versions,
@@ -10,6 +8,7 @@ from .files import (
     write_text,
     written_whole,
 )
+from .reader import load, read_parts
 from .record import listed, load_weights, to_dataset
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""netCDF and text files: written whole under a temporary name and renamed; read into memory."""
+"""netCDF and text files: written whole under a temporary name and renamed."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
-
-import h5py  # type: ignore[import-untyped]
-import numpy as np
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from ...symbolic import InputError
-from ...symbolic.arrays import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def versions() -> dict[str, str]:
@@ -27,7 +25,7 @@ def versions() -> dict[str, str]:
     return {f"{package}_version": version(package) for package in packages}
 
 
-def save(dataset: xr.Dataset, path: Path) -> Path:
+def save(dataset: xr.Dataset, path: str | Path) -> Path:
     """Write a record as netCDF under a temporary name, then rename it.
 
     Raises
@@ -35,49 +33,11 @@ def save(dataset: xr.Dataset, path: Path) -> Path:
     InputError
         If the folder can't be written.
     """
+    path = Path(path)
     content = dataset.to_netcdf(engine="h5netcdf")  # in memory: HDF5 does not survive a full disk
     with written_whole(path) as temporary:
         temporary.write_bytes(content)
     return path
-
-
-def load(path: Path) -> xr.Dataset:
-    """Read a record into memory.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, unreadable, truncated or not a record.
-    """
-    if not path.is_file():
-        raise InputError(f"there is no record '{path}'; give the path of a netCDF file of a run")
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as dataset:
-            return dataset.load()
-    except (OSError, ValueError, KeyError, RuntimeError):
-        raise InputError(
-            f"'{path}' can't be read as a record; it may be truncated, make it again"
-        ) from None
-
-
-def read_parts(path: Path, *names: str) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Read a record's attributes and the variables named, thirty times as fast as `load`.
-
-    Raises
-    ------
-    InputError
-        If the file is missing or has no such variables.
-    """
-    try:
-        with h5py.File(path) as file:
-            attributes = {
-                name: np.asarray(value).item()
-                for name, value in file.attrs.items()
-                if not name.startswith("_")  # netCDF's own
-            }
-            return attributes, {name: np.asarray(file[name]) for name in names}
-    except (OSError, KeyError, ValueError):
-        raise InputError(f"'{path}' can't be read as a record; make it again") from None
 
 
 def writable_folder(folder: Path) -> Path:

@@ -13,7 +13,8 @@ from ...symbolic.arrays import Array
 from ..learning import MonitorSample
 from ..loop import History
 from ..vehicle import VehicleHistory
-from .files import load, versions
+from .files import versions
+from .reader import load
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,7 +13,8 @@ from .model import (
     vehicle_initial_state,
 )
 from .station import StationKeeping
-from .vehicle import Thrusters, Vehicle
+from .thrusters import Thrusters
+from .vehicle import Vehicle
 
 __all__ = [
     "ANGLES",

@@ -9,14 +9,11 @@ vehicles tried (1.4 to 1,860 kg) reach to 1.1, their radii of gyration go from 0
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Array
-
-if TYPE_CHECKING:
-    from .vehicle import Vehicle
 
 DENSITY = 1000.0  # [kg/m^3], fresh water
 REACH = 5.0  # times the cube root of the displaced volume
@@ -27,51 +24,84 @@ BUOYANCY = 5.0  # factor between buoyancy and weight; what thrusters can hold is
 ROUNDED = 1.02  # published moments of inertia are rounded
 
 
-def why_implausible(vehicle: Vehicle) -> str | None:
+@dataclass(frozen=True)
+class Body:
+    """What is to be one vehicle.
+
+    Attributes
+    ----------
+    mass [kg]; weight, buoyancy [N]; gravity [m/s^2]
+    centers : by their names, each (3,) from CO [m]
+    inertia : (3, 3) about CO [kg m^2]
+    added_mass : (6, 6)
+    allocation : (6, n_thrusters), None without thrusters
+    """
+
+    mass: float
+    weight: float
+    buoyancy: float
+    gravity: float
+    centers: dict[str, Array]
+    inertia: Array
+    added_mass: Array
+    allocation: Array | None
+
+    @property
+    def volume(self) -> float:
+        """Displaced volume [m^3]."""
+        return self.buoyancy / (DENSITY * self.gravity)
+
+    @property
+    def unit(self) -> float:
+        """Cube root of the displaced volume [m]."""
+        return float(self.volume ** (1.0 / 3.0))
+
+    @property
+    def central_inertia(self) -> Array:
+        """Inertia about the centre of gravity, shape (3, 3) [kg m^2]: Steiner's theorem."""
+        r = self.centers["center_of_gravity"]
+        return np.asarray(self.inertia - self.mass * (r @ r * np.eye(3) - np.outer(r, r)))
+
+
+def why_implausible(body: Body) -> str | None:
     """Return why these parameters can't be those of one vehicle, in one sentence, or None."""
-    rules: tuple[Callable[[Vehicle], Iterator[str]], ...] = _added_mass, _weight, _places, _inertia
-    return next((fault for rule in rules for fault in rule(vehicle)), None)
+    rules: tuple[Callable[[Body], Iterator[str]], ...] = _added_mass, _weight, _places, _inertia
+    return next((fault for rule in rules for fault in rule(body)), None)
 
 
-def unit_length(vehicle: Vehicle) -> float:
-    """Return the cube root of the displaced volume [m]."""
-    return float((vehicle.buoyancy / (DENSITY * vehicle.gravity)) ** (1.0 / 3.0))
-
-
-def _added_mass(vehicle: Vehicle) -> Iterator[str]:
-    diagonal = np.diag(vehicle.M_added)
-    if diagonal.min() < 0.0:
+def _added_mass(body: Body) -> Iterator[str]:
+    least = float(np.diag(body.added_mass).min())
+    if least < 0.0:
         yield (
-            f"added_mass has {diagonal.min():.4g} on its diagonal: the SNAME derivatives X_udot and so "
-            "on are negative; give M_A = -(X_udot, ...), which is not"
+            f"added_mass has {least:.4g} on its diagonal: the SNAME derivatives X_udot and so on are "
+            "negative; give M_A = -(X_udot, ...), which is not"
         )
 
 
-def _weight(vehicle: Vehicle) -> Iterator[str]:
-    due = vehicle.mass * vehicle.gravity
-    if not 1.0 / WEIGHT <= vehicle.weight / due <= WEIGHT:
+def _weight(body: Body) -> Iterator[str]:
+    due = body.mass * body.gravity
+    if not 1.0 / WEIGHT <= body.weight / due <= WEIGHT:
         yield (
-            f"the weight is {vehicle.weight:g} N, but mass times gravity is {due:.4g} N; give the mass "
-            "in kg and the weight in N"
+            f"the weight is {body.weight:g} N, but mass times gravity is {due:.4g} N; give the mass in "
+            "kg and the weight in N"
         )
-    if not 1.0 / BUOYANCY <= vehicle.buoyancy / vehicle.weight <= BUOYANCY:
+    if not 1.0 / BUOYANCY <= body.buoyancy / body.weight <= BUOYANCY:
         yield (
-            f"the buoyancy is {vehicle.buoyancy:g} N at a weight of {vehicle.weight:g} N, more than "
+            f"the buoyancy is {body.buoyancy:g} N at a weight of {body.weight:g} N, more than "
             f"{BUOYANCY:g} times the one the other; give both in N"
         )
 
 
-def _places(vehicle: Vehicle) -> Iterator[str]:
-    reach = REACH * unit_length(vehicle)
-    bound = f"{_size(vehicle)} reaches {reach:.2g} m at most; give metres"
-    for key in ("center_of_gravity", "center_of_buoyancy"):
-        distance = float(np.linalg.norm(getattr(vehicle, key)))
+def _places(body: Body) -> Iterator[str]:
+    reach = REACH * body.unit
+    bound = f"{_size(body)} reaches {reach:.2g} m at most; give metres"
+    for name, center in body.centers.items():
+        distance = float(np.linalg.norm(center))
         if distance > reach:
-            yield f"{key} is {distance:.4g} m from CO, but {bound}"
-    if vehicle.thrusters is not None:
-        allocation = vehicle.thrusters.matrix
-        force = np.maximum(np.linalg.norm(allocation[:3], axis=0), 1.0)
-        arms = np.linalg.norm(allocation[3:], axis=0) / force
+            yield f"{name} is {distance:.4g} m from CO, but {bound}"
+    if body.allocation is not None:
+        force = np.maximum(np.linalg.norm(body.allocation[:3], axis=0), 1.0)
+        arms = np.linalg.norm(body.allocation[3:], axis=0) / force
         if arms.max() > reach:
             yield (
                 f"thrusters.allocation gives thruster {int(arms.argmax()) + 1} an arm of "
@@ -79,30 +109,22 @@ def _places(vehicle: Vehicle) -> Iterator[str]:
             )
 
 
-def _inertia(vehicle: Vehicle) -> Iterator[str]:
-    moments = np.linalg.eigvalsh(central_inertia(vehicle))
+def _inertia(body: Body) -> Iterator[str]:
+    moments = np.linalg.eigvalsh(body.central_inertia)
     if moments[2] > ROUNDED * (moments[0] + moments[1]):
         shown = ", ".join(f"{moment:.4g}" for moment in moments)
         yield (
             f"the principal moments of inertia about the centre of gravity are {shown} kg m^2, but no "
             "body has one that exceeds the sum of the other two; check inertia (about CO)"
         )
-    unit = unit_length(vehicle)
-    radii = np.sqrt(moments / vehicle.mass)
-    for radius, wrong in ((radii[2], radii[2] > REACH * unit), (radii[0], radii[0] < CORE * unit)):
+    radii, low, high = np.sqrt(moments / body.mass), CORE * body.unit, REACH * body.unit
+    for radius, wrong in ((radii[2], radii[2] > high), (radii[0], radii[0] < low)):
         if wrong:
             yield (
-                f"inertia and mass make a radius of gyration of {radius:.3g} m, but {_size(vehicle)} "
-                f"has one between {CORE * unit:.2g} and {REACH * unit:.2g} m; give kg m^2"
+                f"inertia and mass make a radius of gyration of {radius:.3g} m, but {_size(body)} has "
+                f"one between {low:.2g} and {high:.2g} m; give kg m^2"
             )
 
 
-def central_inertia(vehicle: Vehicle) -> Array:
-    """Return the inertia about the centre of gravity, shape (3, 3) [kg m^2]: Steiner's theorem."""
-    r = np.array(vehicle.center_of_gravity)
-    steiner = vehicle.mass * (r @ r * np.eye(3) - np.outer(r, r))
-    return np.asarray(np.array(vehicle.inertia) - steiner)
-
-
-def _size(vehicle: Vehicle) -> str:
-    return f"a vehicle that displaces {vehicle.buoyancy / (DENSITY * vehicle.gravity):.3g} m^3"
+def _size(body: Body) -> str:
+    return f"a vehicle that displaces {body.volume:.3g} m^3"
