@@ -149,6 +149,11 @@ def record_options(command: argparse.ArgumentParser, name: str) -> None:
             metavar="X",
             help="relative difference up to which numbers count as equal (default: 1e-6)",
         )
+        command.add_argument(
+            "--policy",
+            metavar="FILE.py:MAKE",
+            help="the program of one's own that the run had; without it its inputs are played back",
+        )
     else:
         command.add_argument(
             "--out", type=Path, metavar="FILE", help="file to write (default: RECORD with .mat)"

@@ -188,14 +188,59 @@ def test_a_record_never_runs_a_file(files: Path, one_sentence: Check) -> None:
     save(made.drop_vars("basis_function"), drawn)
     for name in ("laws", "mine", "basis", "plant"):
         (files / f"{name}.py").write_text(trap, encoding="utf-8")
-    refused = ((taught, "is a program"), (own, "can't be run again"), (drawn, "basis_function"))
-    for path, words in refused:
-        with pytest.raises(InputError, match=words) as caught:
-            replay(path)
-        one_sentence(caught.value)
+    with pytest.raises(InputError, match="basis_function") as caught:
+        replay(drawn)
+    one_sentence(caught.value)
+    for path in (taught, own):
+        answer = replay(path)
+        assert answer.verdict == "bit-equal", "played back"
+        assert {"zeta", "u_control", "cost"} < set(answer.differences)
+        assert "critic" not in answer.differences
+        assert any("no part of the record" in change for change in answer.changed)
     answer = replay(linear)
     assert (answer.max_difference, load(linear).attrs["kind"]) == (0.0, "linear")
     assert not (files / "ran").exists()
+
+
+def test_a_program_runs_again_where_the_user_names_it(files: Path, one_sentence: Check) -> None:
+    """From anywhere, if it is the one of the record."""
+    taught, own = files / "law.nc", files / "own.nc"
+    online_record(with_law(files, "Half"), taught)
+    contender_record(scenario(files), f"{files}/mine.py:make", own)
+    elsewhere = files / "elsewhere"
+    elsewhere.mkdir()
+    for name, path, function in (("laws", taught, "Half"), ("mine", own, "make")):
+        file = (files / f"{name}.py").rename(elsewhere / f"{name}.py")
+        answer = replay(path, policy=f"{file}:{function}")
+        assert answer.verdict == "bit-equal"
+        assert "zeta" in answer.differences
+        file.write_text(file.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
+        with pytest.raises(InputError, match="hash of its file is another") as caught:
+            replay(path, policy=f"{file}:{function}")
+        one_sentence(caught.value)
+    with pytest.raises(InputError, match=r"must be file.py:function"):
+        replay(own, policy="learned")
+    linear = files / "linear.nc"
+    contender_record(scenario(files), "linear", linear)
+    with pytest.raises(InputError, match="leave out --policy"):
+        replay(linear, policy=f"{elsewhere}/mine.py:make")
+
+
+def test_wrenches_of_a_vehicle_are_played_back(tmp_path: Path) -> None:
+    """With an observer and thrusters in the run, whose work is in the wrench that the vehicle got."""
+    (tmp_path / "mine.py").write_text("def make(setup): return lambda zeta: -20.0 * zeta[6:]\n")
+    sets = ("mode='disturbed'", "duration=0.4", "thruster_limits=true", "observer_bandwidth=0.5")
+    one = Scenario.load(overrides=[f"simulation.{text}" for text in sets])
+    path = tmp_path / "run.nc"
+    contender_record(one, f"{tmp_path}/mine.py:make", path)
+    (tmp_path / "mine.py").unlink()
+    answer = replay(path)
+    assert answer.verdict == "bit-equal"
+    assert {"zeta", "tau_b", "u_control", "cost"} < set(answer.differences)
+    record = load(path)
+    record["tau_b"][5] += 1e-3
+    save(record, path)
+    assert replay(path).first == ("u_control", 0.1)
 
 
 def test_contender_makes_what_the_file_does(files: Path) -> None:

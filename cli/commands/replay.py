@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     if not 0.0 < tolerance < math.inf:
         raise InputError(f"--tolerance is {tolerance:g}, but must be a positive number")
     with progress(options) as tell:
-        answer = replay(path, tolerance, lambda part: tell("run again", part))
+        answer = replay(path, tolerance, lambda part: tell("run again", part), policy=options.policy)
     if options.out is not None:
         save(answer.record, options.out)
     if options.json:
@@ -54,6 +54,8 @@ def _answer(answer: Replay, path: Path, tolerance: float) -> dict[str, Any]:
 def _print(answer: Replay, path: Path, tolerance: float) -> None:
     print(f"{answer.verdict}: {path} ({answer.kind})")
     if answer.verdict == BIT_EQUAL:
+        for change in answer.changed:
+            print(change)
         return
     sizes = sorted(answer.differences.items(), key=lambda entry: -entry[1])
     rows = [[name, f"{size:.1e}" if size else "0"] for name, size in sizes]

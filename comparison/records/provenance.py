@@ -16,14 +16,25 @@ from ...symbolic.pyfile import file_content, is_named
 from ..scenario import Scenario
 from .store import key_of
 
-FORMAT = 8  # of the records; raise it when what is in them, or how a run is made, changes
+FORMAT = 9  # of the records; raise it when what is in them, or how a run is made, changes
 OFFLINE_KEY = {"vehicle", "problem", "current", "game", "envelope", "offline"}
 
 
+def programs(scenario: Scenario, kind: str) -> list[str]:
+    """Return what is in the user's Python files of a learner's law and of a policy, hexadecimal."""
+    return [*scenario.law_content(), *([file_content(kind)] if is_named(kind) else [])]
+
+
 def provenance(
-    scenario: Scenario, kind: str, include: set[str] | Mapping[str, Any] | None = None
+    scenario: Scenario,
+    kind: str,
+    include: set[str] | Mapping[str, Any] | None = None,
+    own: list[str] | None = None,
 ) -> dict[str, Any]:
     """Return the attributes that say where a record comes from.
+
+    `program` is the hash of the `own` files of law and policy, which are no part of the record;
+    `programs` if None.
 
     `key` is the hash of what the numbers depend on: the settings (those named in `include`, or all),
     the vehicle's parameters, the compiled functions and the versions.
@@ -37,8 +48,8 @@ def provenance(
     parts.append(repr(sorted(versions().items())))
     start = scenario.initial_weights() if include is None else None
     parts.append("" if start is None else start.tobytes().hex())
-    if include is None:
-        parts += [*scenario.law_content(), *([file_content(kind)] if is_named(kind) else [])]
+    used = (programs(scenario, kind) if own is None else own) if include is None else []
+    parts += used
     simulated = include is None or "simulation" in include
     driven = scenario.plant_vehicle() if simulated else None
     plant = "" if driven is None else driven.model_dump_json()
@@ -52,6 +63,7 @@ def provenance(
         "mode": scenario.simulation.mode,
         "seed": scenario.samples.seed,
         "functions": functions,
+        "program": key_of(*used) if used else "",
         "format": FORMAT,
         "machine": machine(),
         "key": key,

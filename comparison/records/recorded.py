@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,11 @@ from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ...symbolic.pyfile import is_named
 from ...symbolic.toml import validate
-from ..policies import CONTENDERS
+from ..policies import CONTENDERS, AnyPolicy
 from ..scenario import Scenario, restored
 from .clairvoyant import KIND as CLAIRVOYANT
 from .clairvoyant import clairvoyant_or_failure, clairvoyant_provenance
+from .own_program import played_back, program_of, with_program
 from .provenance import FORMAT
 from .record_files import as_settings, files_of
 from .runs import online_record, optimum_or_failure, optimum_provenance, trajectory_of
@@ -27,7 +29,7 @@ from .runs import online_record, optimum_or_failure, optimum_provenance, traject
 OPTIMAL, GUESSED = "optimal from ", ", started from "
 
 
-def load_run(path: Path) -> xr.Dataset:
+def load_run(path: str | Path) -> xr.Dataset:
     """Read the record of a run or of an optimum that this version can run again.
 
     Raises
@@ -45,7 +47,8 @@ def load_run(path: Path) -> xr.Dataset:
             f"version runs those of format {FORMAT} again; make it again, or use the one that wrote it "
             f"(stationkeep {record.attrs.get('stationkeep_version', 'unknown')})"
         )
-    if kind not in CONTENDERS and kind != CLAIRVOYANT and not kind.startswith(OPTIMAL):
+    known = kind in CONTENDERS or is_named(kind) or kind == CLAIRVOYANT
+    if not known and not kind.startswith(OPTIMAL):
         raise InputError(
             f"'{path}' is a record of '{kind}', which can't be run again; known are optima and the "
             f"policies {', '.join(CONTENDERS)}"
@@ -79,7 +82,12 @@ def recorded_scenario(record: xr.Dataset) -> Scenario:
     return restored(scenario.model_dump_json(), None, files_of(record, scenario))
 
 
-def run_again(record: xr.Dataset, folder: Path, progress: Progress | None = None) -> xr.Dataset:
+def run_again(
+    record: xr.Dataset,
+    folder: Path,
+    progress: Progress | None = None,
+    policy: str | None = None,
+) -> xr.Dataset:
     """Return the record of the same run, made now.
 
     Parameters
@@ -87,23 +95,29 @@ def run_again(record: xr.Dataset, folder: Path, progress: Progress | None = None
     record : from `load_run`
     folder : where an optimum looks for the record that it started from
     progress : called with the part of a closed loop that is done, 0 to 1; not for an optimum
+    policy : "file.py:make" of the policy or the critic law of one's own that the run had; without it
+        such a run's recorded inputs are played back
 
     Raises
     ------
     InputError
-        If the record can't be read by this version, its learner had a law of the user's own, or the
-        record that an optimum started from is gone.
+        If the record can't be read by this version, `policy` is not what the run had, or the record
+        that an optimum started from is gone.
     """
     scenario, kind = recorded_scenario(record), str(record.attrs["kind"])
-    if kind in CONTENDERS:
-        if CONTENDERS[kind].law is None and is_named(scenario.learner.rule):
-            raise InputError(
-                f"the run learned by the law '{scenario.learner.rule}', which is a program and so no "
-                "part of its record; make the run again with 'stationkeep online' or 'compare'"
-            )
-        make, duration = CONTENDERS[kind].make, scenario.simulation.duration
+    program = program_of(record, scenario)
+    if policy is not None and program is None:
+        raise InputError(f"the record is of '{kind}', which needs no file; leave out --policy")
+    if kind in CONTENDERS or program is not None:
+        duration = scenario.simulation.duration
         tell = None if progress is None else lambda t: progress(t / duration)
-        return online_record(scenario, policy=lambda: make(scenario), kind=kind, progress=tell)
+        if program is not None and policy is None:
+            return played_back(record, scenario, tell)
+        make: Callable[[Scenario], AnyPolicy] = lambda one: CONTENDERS[kind].make(one)  # noqa: E731
+        own = list[str]()
+        if policy is not None:
+            scenario, make, own = with_program(record, scenario, policy)
+        return online_record(scenario, policy=lambda: make(scenario), kind=kind, own=own, progress=tell)
     if kind == CLAIRVOYANT:
         return clairvoyant_or_failure(scenario, clairvoyant_provenance(scenario))
     zeta0, key = _start(scenario, kind)

@@ -12,6 +12,7 @@ import xarray as xr
 
 from ...online.loop import Progress
 from ...symbolic.arrays import Array
+from .own_program import PLAYED, of_the_plant
 from .recorded import load_run, run_again
 
 TOLERANCE = 1e-6
@@ -46,21 +47,32 @@ class Replay:
     record: xr.Dataset
 
 
-def replay(path: Path, tolerance: float = TOLERANCE, progress: Progress | None = None) -> Replay:
+def replay(
+    path: str | Path,
+    tolerance: float = TOLERANCE,
+    progress: Progress | None = None,
+    *,
+    policy: str | None = None,
+) -> Replay:
     """Make the run of a record again from what the record holds, and compare the two.
+
+    A policy or a critic law of one's own is a program, and so no part of a record: without it the
+    inputs that it gave are played back, and what the plant makes of them is compared.
 
     Parameters
     ----------
     tolerance : largest relative difference of numbers that still count as equal
     progress : called with the part of a closed loop that is done, 0 to 1
+    policy : "file.py:make" of the run's own policy or law, which is compared by its hash and run
 
     Raises
     ------
     InputError
-        If the file is no record, or one that this version can't run.
+        If the file is no record, or one that this version can't run; or if `policy` is another one.
     """
     record = load_run(path)
-    return compared(record, run_again(record, path.parent, progress), tolerance)
+    again = run_again(record, Path(path).parent, progress, policy)
+    return compared(of_the_plant(record) if PLAYED in again.attrs else record, again, tolerance)
 
 
 def compared(then: xr.Dataset, now: xr.Dataset, tolerance: float = TOLERANCE) -> Replay:
@@ -119,7 +131,9 @@ def changes(then: xr.Dataset, now: xr.Dataset) -> list[str]:
     ]
     if then.attrs.get("functions") != now.attrs["functions"]:
         found.append("the generated code of f, g and the basis is another")
-    elif not found and then.attrs.get("key") != now.attrs["key"]:
+    if PLAYED in now.attrs:
+        return [*found, str(now.attrs[PLAYED])]
+    if not found and then.attrs.get("key") != now.attrs["key"]:
         found.append("the record's settings are not those that it was made with")
     return found
 

@@ -39,6 +39,7 @@ def online_record(
     *,
     policy: Callable[[], AnyPolicy] | None = None,
     kind: str = "learned",
+    own: list[str] | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Return the record of a closed-loop run, from `path` if it holds this very run.
@@ -47,8 +48,9 @@ def online_record(
     ----------
     policy : makes what drives the vehicle; the scenario's controller if None
     kind : names the policy in the record
+    own : what is in the user's files of law and policy; see `provenance`
     """
-    attributes = provenance(scenario, kind)
+    attributes = provenance(scenario, kind, own=own)
 
     def make() -> xr.Dataset:
         history = closed_loop(scenario, None if policy is None else policy(), progress)
