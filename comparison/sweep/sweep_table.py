@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import os
+import stat
 import time
 import zlib
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from io import FileIO
 from itertools import islice
 from pathlib import Path
@@ -42,6 +44,7 @@ class Journal:
         self.broken = 0
         self._keys, self._offsets = array("Q"), array("q")
         self._synced = 0.0
+        _require_own(path)
         try:
             self._file: BinaryIO = path.open("a+b")
             self._read()
@@ -132,6 +135,30 @@ class Journal:
         return InputError(
             f"'{self.path}' can't be written ({error.strerror}); what was finished is kept, make room "
             "and run the sweep again"
+        )
+
+
+def _require_own(path: Path) -> None:
+    """Raise InputError where a path is something else than a journal, which would be changed."""
+    try:
+        kind = path.lstat()
+    except OSError:
+        return
+    fault = None
+    if not stat.S_ISREG(kind.st_mode):
+        fault = "a link, a folder or a device"
+    elif kind.st_nlink > 1:
+        fault = "a link"
+    elif kind.st_size:
+        with suppress(OSError), path.open("rb") as file:
+            head = file.read(64)
+            # one byte may be changed; of a torn line there may be less
+            if not (head[8:9] == b" " or head[9:10] == b"{" or len(head) < 9):
+                fault = "a file of something else"
+    if fault is not None:
+        raise InputError(
+            f"'{path}' is {fault}, but has the name of a sweep's journal; move it away, or choose "
+            "another folder with --out"
         )
 
 

@@ -21,12 +21,15 @@ import shutil
 import subprocess
 import time
 import uuid
+import zlib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import casadi
 import platformdirs
+
+from .trust import why_untrusted
 
 logger = logging.getLogger("stationkeep")
 
@@ -36,6 +39,7 @@ FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 NATIVE_FLAGS = ("-O3", "-fPIC", "-shared", "-march=native", "-ffp-contract=fast")
 _TEMPORARY = ".build-"
 _STALE_AFTER = 3600.0  # s; a temporary folder older than this was left by a killed build
+_HOST = f"{zlib.crc32(platform.node().encode()):08x}"
 
 
 class CompilationError(Exception):
@@ -123,7 +127,14 @@ def compile_source(source: str, flags: tuple[str, ...]) -> Library:
     if compiler is None:
         raise CompilationError("no C compiler was found (cc, gcc, clang)")
     key = _key(source, compiler, flags)
-    entry = cache_folder() / key
+    folder = cache_folder().expanduser().absolute().resolve()
+    fault = why_untrusted(folder)
+    if fault is not None:
+        raise CompilationError(
+            f"the cache of compiled functions is not used: {fault}; delete it, or set "
+            "STATIONKEEP_CACHE to a folder of your own"
+        )
+    entry = folder / key
     if _is_whole(entry):
         return Library(entry / "function.so", key, cache_hit=True)
     try:
@@ -156,7 +167,12 @@ def _digest(path: Path) -> str:
 
 
 def _is_whole(entry: Path) -> bool:
-    """Return whether an entry's library is the one that its manifest names."""
+    """Return whether an entry is the user's own and its library the one that its manifest names."""
+    for path in (entry, entry / "manifest.json", entry / "function.so"):
+        fault = why_untrusted(path)
+        if fault is not None:
+            logger.warning("a compiled function is built again: %s", fault)
+            return False
     try:
         manifest = json.loads((entry / "manifest.json").read_text(encoding="utf-8"))
         return bool(manifest["sha256"] == _digest(entry / "function.so"))
@@ -165,10 +181,10 @@ def _is_whole(entry: Path) -> bool:
 
 
 def _build(source: str, compiler: Compiler, flags: tuple[str, ...], entry: Path) -> None:
-    entry.parent.mkdir(parents=True, exist_ok=True)
+    entry.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     _remove_stale(entry.parent)
-    folder = entry.parent / f"{_TEMPORARY}{os.getpid()}-{uuid.uuid4().hex}"
-    folder.mkdir()
+    folder = entry.parent / f"{_TEMPORARY}{_HOST}-{os.getpid()}-{uuid.uuid4().hex}"
+    folder.mkdir(mode=0o700)
     try:
         code, library = folder / "function.c", folder / "function.so"
         code.write_text(source, encoding="utf-8")
@@ -180,6 +196,8 @@ def _build(source: str, compiler: Compiler, flags: tuple[str, ...], entry: Path)
             raise CompilationError(f"'{compiler.path}' failed ({fault})")
         manifest = {"sha256": _digest(library), "compiler": compiler.version, "flags": flags}
         (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+        for path in folder.iterdir():
+            path.chmod(0o700)  # whatever the umask: what others can write is not loaded
         _publish(folder, entry)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -204,14 +222,30 @@ def _publish(folder: Path, entry: Path) -> None:
 
 
 def _remove_stale(folder: Path) -> None:
+    """Remove what killed builds left: those of this machine at once, of others after a while."""
     for left in folder.glob(f"{_TEMPORARY}*"):
         with contextlib.suppress(OSError):
-            if time.time() - left.stat().st_mtime > _STALE_AFTER:
+            if _is_dead(left) or time.time() - left.lstat().st_mtime > _STALE_AFTER:
                 _remove(left)
 
 
+def _is_dead(left: Path) -> bool:
+    """Whether a build's folder is that of a process of this machine that is no more."""
+    host, _, rest = left.name.removeprefix(_TEMPORARY).partition("-")
+    number = rest.partition("-")[0]
+    if host != _HOST or not number.isdigit() or os.name == "nt":
+        return False
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
+
+
 def _remove(path: Path) -> None:
-    if path.is_dir():
+    if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path, ignore_errors=True)
     else:
         path.unlink(missing_ok=True)
