@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat, PositiveInt
 
 from ..symbolic import Problem
 from ..symbolic.toml import Settings
@@ -38,13 +38,13 @@ class OfflineSettings(Settings):
     costate_tolerance : largest relative gap to the finite difference of the value
     """
 
-    horizon: PositiveFloat | None = None
-    intervals: PositiveInt = MeshSettings.certified.n_intervals
+    horizon: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
+    intervals: Annotated[int, Field(ge=1, le=10_000)] = MeshSettings.certified.n_intervals
     degree: Annotated[int, Field(ge=1, le=8)] = MeshSettings.certified.degree
-    grading: NonNegativeFloat = MeshSettings.certified.grading
+    grading: Annotated[float, Field(ge=0.0, le=100.0)] = MeshSettings.certified.grading
     aligned: bool = True
-    rounds: PositiveInt = 5
-    starts: NonNegativeInt = 4
+    rounds: Annotated[int, Field(ge=1, le=100)] = 5
+    starts: Annotated[int, Field(ge=0, le=1000)] = 4
     method: Method = "newton"
     max_iterations: PositiveInt = 10_000
     max_seconds: PositiveFloat = 300.0

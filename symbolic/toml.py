@@ -5,9 +5,10 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic_core import PydanticKnownError
 
 from .errors import InputError, nearest
 
@@ -17,8 +18,37 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _no_words_for_numbers(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuse a text or a truth value where a number belongs: pydantic would make one of it."""
+        kinds = _kinds(cls.model_fields[str(info.field_name)].annotation)
+        numbers = kinds & {int, float}
+        if numbers and any(kind not in kinds and _holds(value, kind) for kind in (str, bool)):
+            if numbers == {int}:
+                raise PydanticKnownError("int_type")
+            raise PydanticKnownError("float_type")
+        return value
+
 
 S = TypeVar("S", bound=BaseModel)
+LARGEST = 1 << 24  # bytes of a text file
+Seed = Annotated[int, Field(ge=0, lt=2**63)]  # as a record can hold it
+
+
+def _kinds(annotation: Any) -> set[Any]:
+    """Return the types at the leaves of an annotation; those of the words of a `Literal`."""
+    parts = get_args(annotation)
+    if not parts:
+        return {annotation if isinstance(annotation, type) else type(annotation)}
+    return set().union(*(_kinds(part) for part in parts))
+
+
+def _holds(value: Any, kind: type) -> bool:
+    """Whether a value is of a type, or an array with an entry of it."""
+    if isinstance(value, (list, tuple)):
+        return any(_holds(entry, kind) for entry in value)
+    return isinstance(value, kind)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -30,16 +60,41 @@ def read_toml(path: Path) -> dict[str, Any]:
         If the file is missing, unreadable, not UTF-8 or not valid TOML (for instance truncated).
     """
     try:
+        return tomllib.loads(read_text(path, "a TOML file"))
+    except RecursionError:
+        raise InputError(f"'{path}' nests its values too deeply; it is no settings file") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"'{path}' is not valid TOML ({error}); correct or restore it") from None
+
+
+def read_text(path: Path, what: str) -> str:
+    """Return the text of a user's file; a byte order mark, as Windows writes it, is no part of it.
+
+    Parameters
+    ----------
+    what : the file is to be, for messages
+
+    Raises
+    ------
+    InputError
+        If the file is missing, no file of this kind, unreadable, too large or not UTF-8.
+    """
+    try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise InputError(f"'{path}' is a pipe or a device; give the path of {what}")
         with path.open("rb") as file:
-            return tomllib.load(file)
+            content = file.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise InputError(f"'{path}' is larger than {LARGEST >> 20} MiB; give the path of {what}")
+        return content.decode("utf-8-sig")
     except FileNotFoundError:
-        raise InputError(f"there is no file '{path}'; give the path of a TOML file") from None
+        raise InputError(f"there is no file '{path}'; give the path of {what}") from None
     except OSError as error:
         raise InputError(f"'{path}' can't be read ({error.strerror}); check the path") from None
     except UnicodeDecodeError:
-        raise InputError(f"'{path}' is not UTF-8 text; give a TOML file") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"'{path}' is not valid TOML ({error}); correct or restore it") from None
+        raise InputError(f"'{path}' is not UTF-8 text; give {what}") from None
+    except ValueError:  # a null character
+        raise InputError(f"{str(path)!r} is no path of a file; give the path of {what}") from None
 
 
 def shipped_names(package: str, folder: str) -> list[str]:

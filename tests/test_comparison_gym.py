@@ -31,6 +31,7 @@ def test_gymnasium_accepts_it(actions: Any) -> None:
 
 def test_a_vehicle_without_thrusters_and_with_noise_and_waves() -> None:
     settings = ["simulation.noise.position=0.05", "simulation.disturbance.kind=waves"]
+    settings.append("simulation.mode=disturbed")
     env = StationKeepingEnv(Scenario.load("rexrov", [*QUICK, *settings]))
     check_env(env, skip_render_check=True)
     first, info = env.reset(seed=3)

@@ -70,6 +70,7 @@ def test_overrides(override: str, group: str, key: str, value: object) -> None:
 
 def test_overrides_of_deep_and_top_keys() -> None:
     overrides = ["simulation.disturbance.kind=current", "simulation.disturbance.velocity=[0.1, 0, 0]"]
+    overrides.append("simulation.mode=disturbed")
     scenario = Scenario.load("bluerov2-heavy", [*overrides, "current=[0, 0.2, 0]", "vehicle=rexrov"])
     assert scenario.simulation.disturbance.kind == "current"
     assert scenario.simulation.disturbance.velocity == (0.1, 0.0, 0.0)

@@ -247,15 +247,20 @@ def test_the_monitor_looks_at_its_own_pace_and_at_the_end() -> None:
     assert [look.time for look in history.looks] == [*every_third, history.time[-1]]
 
 
-@pytest.mark.parametrize("kind", ["constant", "current", "waves"])
-def test_disturbed_runs_hold_on(kind: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "given"),
+    [
+        ("constant", ["force=[3.0, 0, 0, 0, 0, 0]", "start=0.5"]),
+        ("current", ["velocity=[0.1, 0.05, 0]", "start=0.5"]),
+        ("waves", []),
+    ],
+)
+def test_disturbed_runs_hold_on(kind: str, given: list[str]) -> None:
     history = run(
         quick_scenario(
             "simulation.mode=disturbed",
             f"simulation.disturbance.kind={kind}",
-            "simulation.disturbance.force=[3.0, 0, 0, 0, 0, 0]",
-            "simulation.disturbance.velocity=[0.1, 0.05, 0]",
-            "simulation.disturbance.start=0.5",
+            *(f"simulation.disturbance.{text}" for text in given),
         )
     )
     assert history.stopped is None

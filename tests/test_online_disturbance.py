@@ -224,7 +224,7 @@ def test_current_steps_to_its_velocity() -> None:
 
 
 def test_no_disturbance_is_nothing() -> None:
-    source = build_disturbance(DisturbanceSettings(force=FORCE, velocity=(1.0, 1.0, 1.0)))
+    source = build_disturbance(DisturbanceSettings())
     here: list[Array] = []
     for t in (0.0, 5.0):
         now = source.at(t, HERE)

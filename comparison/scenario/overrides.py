@@ -20,20 +20,36 @@ def override(data: dict[str, Any], text: str) -> None:
 
 
 def parse_value(text: str) -> Any:
-    """Return a value written as in TOML; what is not TOML is a string."""
+    """Return a value written as in TOML; what is not TOML is a string. Raises InputError for two."""
+    found = _toml(f"value = {text}", text)
+    return text.strip() if found is None else found["value"]
+
+
+def _toml(line: str, text: str) -> dict[str, Any] | None:
+    """Return what a line of TOML with one key holds, None if it is not TOML.
+
+    Raises
+    ------
+    InputError
+        If it holds other keys too, or nests its values too deeply.
+    """
     try:
-        return tomllib.loads(f"value = {text}")["value"]
+        found = tomllib.loads(line)
     except tomllib.TOMLDecodeError:
-        return text.strip()
+        return None
+    except RecursionError:
+        raise InputError(
+            f"the value {text[:40]}... nests too deeply; write a number or an array"
+        ) from None
+    if len(found) > 1:
+        raise InputError(f"{text!r} sets more than one key; give each a --set of its own")
+    return found
 
 
 def parse_values(text: str) -> list[Any]:
     """Return values with commas between, each as `parse_value` reads it."""
-    try:
-        values = tomllib.loads(f"values = [{text}]")["values"]
-    except tomllib.TOMLDecodeError:
-        return [parse_value(part) for part in text.split(",")]
-    return list(values)
+    found = _toml(f"values = [{text}]", text)
+    return [parse_value(part) for part in text.split(",")] if found is None else list(found["values"])
 
 
 def replace_value(data: dict[str, Any], key: str, value: Any, where: str) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import PositiveFloat, model_validator
+from typing import Annotated
+
+from pydantic import Field, model_validator
 
 from ...symbolic.toml import Settings
 
@@ -22,7 +24,7 @@ class GameSettings(Settings):
     Q: Weight | None = None
     R: Weight | None = None
     W_d: Weight | str = "I"
-    gamma: PositiveFloat | None = None
+    gamma: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
 
     @model_validator(mode="after")
     def _word(self) -> GameSettings:
@@ -41,7 +43,7 @@ class EnvelopeSettings(Settings):
     """
 
     half_widths: tuple[float, ...] | None = None
-    scale: PositiveFloat = 1.0
+    scale: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
 
     @model_validator(mode="after")
     def _positive(self) -> EnvelopeSettings:

@@ -7,15 +7,13 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     Field,
     NonNegativeFloat,
-    NonNegativeInt,
     PositiveFloat,
-    PositiveInt,
     field_validator,
     model_validator,
 )
 
 from ...symbolic.pyfile import is_named
-from ...symbolic.toml import Settings
+from ...symbolic.toml import Seed, Settings
 from ..laws import Normalizer
 
 AS_PRINTED: dict[str, Any] = {
@@ -69,7 +67,7 @@ class LearnerSettings(Settings):
     rule: str = "least_squares"
     error: Literal["bellman", "costate"] = "costate"
     safeguard: bool = True
-    horizon: PositiveFloat = 30.0
+    horizon: Annotated[float, Field(gt=0.0, le=1e5)] = 30.0
     steps: Annotated[int, Field(ge=10, le=2000)] = 150
     normalizer: Normalizer = "state_cost"
     gain_critic: NonNegativeFloat = 1.0
@@ -138,10 +136,10 @@ class SampleSettings(Settings):
     remember : also learn weights for the whole envelope, to be used when learning is switched off
     """
 
-    number: NonNegativeInt = 2000
-    seed: NonNegativeInt = 1
+    number: Annotated[int, Field(ge=0, le=1_000_000)] = 2000
+    seed: Seed = 1
     inner: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.1
     spread: PositiveFloat = 0.2
-    paths: PositiveInt = 3
-    path_points: Annotated[int, Field(ge=2)] = 20
+    paths: Annotated[int, Field(ge=1, le=1000)] = 3
+    path_points: Annotated[int, Field(ge=2, le=10_000)] = 20
     remember: bool = False

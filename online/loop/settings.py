@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeInt, PositiveFloat
+from pydantic import Field, PositiveFloat, model_validator
 
-from ...symbolic.toml import Settings
+from ...symbolic.toml import Seed, Settings
 from ...symbolic.value import BOUND
+
+MOST_STEPS = 1e7  # of a run: more than two days at 50 Hz
 
 
 class RunSettings(Settings):
@@ -28,10 +30,20 @@ class RunSettings(Settings):
     """
 
     initial_state: tuple[float, ...] | None = None
-    duration: PositiveFloat = 60.0
+    duration: Annotated[float, Field(gt=0.0, le=1e6)] = 60.0
     mode: Literal["game", "disturbed"] = "game"
-    control_period: PositiveFloat = 0.02
+    control_period: Annotated[float, Field(ge=1e-5, le=1e4)] = 0.02
     tolerance: Annotated[float, Field(gt=0.0, lt=1e-2)] = 1e-8
     chi: PositiveFloat = BOUND
     monitor_period: PositiveFloat = 1.0
-    seed: NonNegativeInt = 1
+    seed: Seed = 1
+
+    @model_validator(mode="after")
+    def _countable(self) -> RunSettings:
+        steps = self.duration / self.control_period
+        if not 0.5 <= steps <= MOST_STEPS:
+            raise ValueError(
+                f"duration is {self.duration:g} s and control_period {self.control_period:g} s, which "
+                f"makes {steps:.3g} control steps; choose them for 1 to {MOST_STEPS:g}"
+            )
+        return self

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from ...symbolic.toml import Settings
+from ...symbolic.toml import Seed, Settings
 from ..loop import RunSettings
 
 Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
+USED = {  # by the kind of a disturbance
+    "none": set[str](),
+    "constant": {"force", "start"},
+    "sinusoid": {"force", "frequency", "start"},
+    "current": {"velocity", "start"},
+    "waves": {
+        *("wave_height", "wave_period", "wave_heading", "depth", "peak_enhancement", "seed"),
+    },
+}
 ZERO_SIX: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -42,7 +51,18 @@ class DisturbanceSettings(Settings):
     wave_heading: float = 0.0
     depth: PositiveFloat = 3.0
     peak_enhancement: Annotated[float, Field(ge=1.0)] = 3.3
-    seed: NonNegativeInt = 1
+    seed: Seed = 1
+
+    @model_validator(mode="after")
+    def _used(self) -> DisturbanceSettings:
+        for name in sorted(self.model_fields_set - USED[self.kind] - {"kind"}):
+            if getattr(self, name) != type(self).model_fields[name].default:
+                uses = [kind for kind, used in USED.items() if name in used]
+                raise ValueError(
+                    f"{name} is {getattr(self, name)}, but a disturbance of kind '{self.kind}' has none"
+                    f"; leave it out, or choose kind {' or '.join(map(repr, uses))}"
+                )
+        return self
 
 
 class NoiseSettings(Settings):
@@ -59,7 +79,7 @@ class NoiseSettings(Settings):
     attitude: NonNegativeFloat = 0.0
     velocity: NonNegativeFloat = 0.0
     rate: NonNegativeFloat = 0.0
-    seed: NonNegativeInt = 1
+    seed: Seed = 1
 
 
 class SimulationSettings(RunSettings):
@@ -92,5 +112,10 @@ class SimulationSettings(RunSettings):
             raise ValueError(
                 f"observer_bandwidth is {self.observer_bandwidth:g} and mode is 'game', but there an "
                 'observer would cancel what the disturbance player does; choose mode = "disturbed"'
+            )
+        if self.disturbance.kind != "none" and self.mode == "game":
+            raise ValueError(
+                f"disturbance.kind is '{self.disturbance.kind}' and mode is 'game', where the "
+                'disturbance is the second player\'s; choose mode = "disturbed", or leave it out'
             )
         return self
