@@ -77,6 +77,27 @@ def _run(options: argparse.Namespace) -> int:
     except StationkeepError as error:
         print(f"stationkeep: {error}", file=sys.stderr)
         return 1
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        print(f"stationkeep: {_unforeseen(error)}", file=sys.stderr)
+        return 1
+
+
+def _unforeseen(error: Exception) -> str:
+    """Keep the traceback of a fault of the program in a file, and return a sentence that names it."""
+    import tempfile
+    import traceback
+
+    kind = f"{type(error).__name__} came up that was not foreseen"
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="stationkeep-", suffix=".txt", delete=False, encoding="utf-8"
+        ) as file:
+            file.write("".join(traceback.format_exception(error)))
+    except OSError:
+        return f"{kind}, a fault of the program: {' '.join(str(error).split())[:200]}"
+    return f"{kind}, a fault of the program; its traceback is in '{file.name}', please send it to us"
 
 
 class _Parser(argparse.ArgumentParser):

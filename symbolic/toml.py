@@ -79,6 +79,8 @@ def read_text(path: Path, what: str) -> str:
     InputError
         If the file is missing, no file of this kind, unreadable, too large or not UTF-8.
     """
+    if "\0" in str(path):
+        raise InputError(f"{str(path)!r} is no path of a file; give the path of {what}")
     try:
         if path.exists() and not path.is_file() and not path.is_dir():
             raise InputError(f"'{path}' is a pipe or a device; give the path of {what}")
@@ -93,8 +95,6 @@ def read_text(path: Path, what: str) -> str:
         raise InputError(f"'{path}' can't be read ({error.strerror}); check the path") from None
     except UnicodeDecodeError:
         raise InputError(f"'{path}' is not UTF-8 text; give {what}") from None
-    except ValueError:  # a null character
-        raise InputError(f"{str(path)!r} is no path of a file; give the path of {what}") from None
 
 
 def shipped_names(package: str, folder: str) -> list[str]:

@@ -57,6 +57,12 @@ def test_names() -> None:
     assert closed.output_labels == [*plant.state_labels, *plant.input_labels]
 
 
+def test_a_name_with_a_dot_is_another() -> None:
+    """python-control refuses it."""
+    dotted = Scenario.load("bluerov2-heavy", ['vehicle_parameters.name="BlueROV2 v1.1"'])
+    assert to_control(dotted).name == "BlueROV2 v1_1"
+
+
 def test_the_plant_agrees_with_the_plant_of_the_runs() -> None:
     game = scenario("bluerov2-heavy")
     held = HeldPlant(game.station_keeping(), build_disturbance(game.simulation.disturbance), 1e-11)

@@ -78,8 +78,8 @@ def test_ranges() -> None:
 def test_values_are_read_as_in_toml_or_as_words() -> None:
     words = parse_vary("basis.name=quadratic,drag", SCENARIO)
     assert words == Choices("basis.name", ("quadratic", "drag"))
-    arrays = parse_vary("simulation.disturbance.velocity=[0.1,0,0],[0.2,0,0]", SCENARIO)
-    assert arrays == Choices("simulation.disturbance.velocity", ([0.1, 0, 0], [0.2, 0, 0]))
+    arrays = parse_vary("current=[0.1,0,0],[0.2,0,0]", SCENARIO)
+    assert arrays == Choices("current", ([0.1, 0, 0], [0.2, 0, 0]))
     assert parse_vary("learner.safeguard=true,false", SCENARIO) == Choices(
         "learner.safeguard", (True, False)
     )

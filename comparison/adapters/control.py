@@ -61,6 +61,7 @@ def to_control(scenario: Scenario, policy: VehiclePolicy | None = None) -> contr
     rates = _rates(driven.plant, np.array(scenario.current))
     wrench = None if policy is None else _wrench(station.model, _law(policy))
     update, output = (rates, _state) if wrench is None else _closed(rates, wrench)
+    name = driven.vehicle.name.replace(".", "_")  # python-control has a use of its own for the dot
     inputs, extra = (WRENCH, []) if wrench is None else (DISTURBANCE, WRENCH)
     return control.nlsys(
         lambda t, zeta, u, params: update(zeta, u),
@@ -68,7 +69,7 @@ def to_control(scenario: Scenario, policy: VehiclePolicy | None = None) -> contr
         inputs=inputs,
         states=list(STATE_NAMES),
         outputs=[*STATE_NAMES, *extra],
-        name=driven.vehicle.name if policy is None else f"{driven.vehicle.name} in closed loop",
+        name=name if policy is None else f"{name} in closed loop",
     )
 
 
