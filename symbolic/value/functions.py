@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -146,8 +146,12 @@ class ValueFunctions:
         }
         return dense_function("point", {"zeta": zeta}, outputs)
 
-    def _export_mapped(self, function: casadi.Function, operations: int) -> Kernel:
-        kernel, described = export(function, compiled=self.compiled, operations=operations)
+    def _export_mapped(
+        self, function: casadi.Function, operations: int, constants: Sequence[Array] = ()
+    ) -> Kernel:
+        kernel, described = export(
+            function, compiled=self.compiled, operations=operations, constants=constants
+        )
         self._exports[function.name()] = described
         return kernel
 

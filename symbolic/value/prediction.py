@@ -13,7 +13,7 @@ gradient of the Bellman equation r + V_ζ F = 0 along the path, so λ is what V_
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,7 +28,7 @@ from .basis import Basis
 from .stepping import Stepping
 
 BOUND = 4.0  # half-widths; a path that gets farther, or out of the domain, counts as lost
-Exporter = Callable[[casadi.Function, int], Kernel]
+Exporter = Callable[[casadi.Function, int, Sequence[Array]], Kernel]
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Prediction:
     ----------
     problem, basis : of the policies
     stepping : the steps over the horizon, and their method
-    exporter : makes a kernel of a function and its number of operations
+    exporter : makes a kernel of a function, its number of operations and its last inputs' values
     """
 
     def __init__(self, problem: Problem, basis: Basis, stepping: Stepping, exporter: Exporter) -> None:
@@ -191,11 +191,7 @@ class Prediction:
         symbols = [*inputs, *parameters]
         names = [symbol.name() for symbol in symbols]
         function = casadi.Function(name, symbols, [*outputs.values()], names, [*outputs])
-        kernel = self._exporter(function, operations)
-        values = self.stepping.parameters.values()
-        for array, value in zip(kernel.inputs[len(inputs) :], values, strict=True):
-            array[...] = value
-        return kernel
+        return self._exporter(function, operations, [*self.stepping.parameters.values()])
 
     @cached_property
     def _path_kernel(self) -> Kernel:
@@ -258,7 +254,7 @@ class Prediction:
         )
         names = ["points", "costates"], ["regressors", "targets", "sigmas"]
         function = casadi.Function("costate_rows", [points, costates], [*mapped], *names)
-        return self._exporter(function, point.n_instructions() * n_points)
+        return self._exporter(function, point.n_instructions() * n_points, ())
 
 
 def _called(kernel: Kernel, *arguments: Array) -> tuple[Array, ...]:
