@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from ...symbolic import Basis, Game, Problem, ValueFunctions
+import logging
+import math
+
+import numpy as np
+
+from ...symbolic import Basis, Game, InputError, Problem, ValueFunctions
 from ...symbolic.arrays import Array
+from ...symbolic.game import require_time_step
 from ..laws import Critic, actor_step
 from ..paper import Residual, value
 from ..rows import Observation, Predictor, Weights
 from . import build
 from .learner_step import LearnerStep
-from .safeguard import Accepted, Certified, Unguarded
+from .safeguard import Accepted, Actors, Certified, Unguarded
 from .settings import LearnerSettings, SampleSettings
+
+logger = logging.getLogger("stationkeep")
 
 
 class Learner:
@@ -35,6 +43,11 @@ class Learner:
     critic, actor_1, actor_2 : (m,) Ŵ_c, Ŵ_a1, Ŵ_a2
     linear : whether the linear H-infinity policy is in use instead of the actors'
     source, law, projection, guard, memory : what a step consists of
+
+    Raises
+    ------
+    InputError
+        If the weights to start from, or those of reference, are not finite.
     """
 
     def __init__(
@@ -54,6 +67,11 @@ class Learner:
         self.functions = ValueFunctions(problem, basis) if functions is None else functions
         self.reference = reference
         start = reference * settings.weight_factor if initial is None else initial
+        if not (np.isfinite(start).all() and np.isfinite(reference).all()):
+            raise InputError(
+                "the weights to start from contain NaN or infinity; take them from another record, or "
+                'start from learner.weights = "riccati"'
+            )
         self.critic, self.actor_1, self.actor_2 = start.copy(), start.copy(), start.copy()
         self._initial = (self.actor_1, self.actor_2)
         self.linear = False
@@ -73,26 +91,56 @@ class Learner:
         return self.problem.game
 
     def step(self, zeta: Array, dt: float) -> LearnerStep:
-        """Learn for dt [s] from the state ζ (n,) and the samples: the algorithm."""
+        """Learn for dt [s] from the state ζ (n,) and the samples: the algorithm.
+
+        A step that would leave weights or information not finite is not taken: all stay as they were.
+
+        Raises
+        ------
+        InputError
+            If ζ is not n finite numbers in the domain, or dt no positive time.
+        """
+        given = isinstance(zeta, np.ndarray) and zeta.shape == (self.problem.n_states,)
+        if not (given and math.isfinite(zeta @ zeta)):
+            zeta = self.problem.require_state(zeta)
+        dt = require_time_step(dt)
         # certify: the actors of before, or the reference's
         start = self.guard.certified(zeta, (self.actor_1, self.actor_2))
         weights = (self.critic, *start.actors)
         # rows of (17)
         self.source.move(zeta, weights)
         seen = self.source.at(zeta, weights)
-        # critic (19)
-        self.critic = self.law.step(self.critic, seen.equations, dt)
-        # actors (20)(21)
-        gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
-        proposed = (
-            actor_step(start.actors[0], self.critic, gains[0], dt, self.projection),
-            actor_step(start.actors[1], self.critic, gains[1], dt, self.projection),
-        )
-        # accept what is certified of their way
-        end = self.guard.accepted(zeta, start, proposed)
+        # critic (19), actors (20)(21)
+        moved = self._moved(seen, start.actors, dt)
+        if moved is None:
+            end = self.guard.kept(zeta, start)
+        else:
+            # accept what is certified of their way
+            self.critic, proposed = moved
+            end = self.guard.accepted(zeta, start, proposed)
         (self.actor_1, self.actor_2), self.linear = end.actors, end.linear
         self.memory.step()
-        return self._recorded(weights, seen, start, end)
+        return self._recorded(weights, seen, start, end, rolled_back=moved is None)
+
+    def _moved(self, seen: Observation, actors: Actors, dt: float) -> tuple[Array, Actors] | None:
+        """Return critic and proposed actors after dt [s], or None, the law put back, if not finite."""
+        before = dict(getattr(self.law, "__dict__", {}))
+        gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
+        try:
+            # critic (19)
+            critic = self.law.step(self.critic, seen.equations, dt)
+            # actors (20)(21)
+            proposed = (
+                actor_step(actors[0], critic, gains[0], dt, self.projection),
+                actor_step(actors[1], critic, gains[1], dt, self.projection),
+            )
+            if all(np.isfinite(weights).all() for weights in (critic, *proposed)):
+                return critic, proposed
+        except np.linalg.LinAlgError as error:
+            logger.debug("a learning step was not taken: %s", error)
+        if before:
+            vars(self.law).update(before)
+        return None
 
     def certify(self, zeta: Array) -> LearnerStep:
         """Use the initial weights where they are predicted to cost less than the reference, else that.
@@ -134,7 +182,13 @@ class Learner:
         return self.source.residual((self.critic, self.actor_1, self.actor_2))
 
     def _recorded(
-        self, weights: Weights, seen: Observation, start: Certified, end: Accepted
+        self,
+        weights: Weights,
+        seen: Observation,
+        start: Certified,
+        end: Accepted,
+        *,
+        rolled_back: bool = False,
     ) -> LearnerStep:
         """Return the step as it is recorded: what was seen, under which weights, and what was done."""
         return LearnerStep(
@@ -149,4 +203,5 @@ class Learner:
             accepted=end.part,
             fallback=(start.restarted and end.part == 0.0) or end.linear,
             linear=end.linear,
+            rolled_back=rolled_back,
         )

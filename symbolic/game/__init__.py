@@ -2,7 +2,7 @@
 
 from .angles import Angles, AngleTracker, Equivalence
 from .checks import InverseDynamics
-from .domain import Bound, margins_and_shown, outside, require_numbers
+from .domain import Bound, margins_and_shown, outside, require_numbers, require_time_step
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import Problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
@@ -32,6 +32,7 @@ __all__ = [
     "problem_from_data",
     "problem_to_data",
     "require_numbers",
+    "require_time_step",
     "stabilising_solution",
     "weight_matrix",
 ]
