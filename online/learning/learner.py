@@ -101,7 +101,7 @@ class Learner:
             If ζ is not n finite numbers in the domain, or dt no positive time.
         """
         given = isinstance(zeta, np.ndarray) and zeta.shape == (self.problem.n_states,)
-        if not (given and math.isfinite(zeta @ zeta)):
+        if not (given and math.isfinite(zeta.dot(zeta))):
             zeta = self.problem.require_state(zeta)
         dt = require_time_step(dt)
         # certify: the actors of before, or the reference's
@@ -148,10 +148,18 @@ class Learner:
         For a learner that is not to learn, with a safeguard.
         """
         start = self.guard.certified(zeta, self._initial)
-        end = self.guard.kept(zeta, start)
-        (self.actor_1, self.actor_2), self.linear = end.actors, end.linear
+        end = self._used(zeta, start)
         weights = (self.critic, *end.actors)
         return self._recorded(weights, self.source.at(zeta, weights), start, end)
+
+    def keep(self, zeta: Array) -> None:
+        """Use the present weights, or what is predicted to cost less at ζ (n,), and learn nothing."""
+        self._used(zeta, self.guard.certified(zeta, (self.actor_1, self.actor_2)))
+
+    def _used(self, zeta: Array, start: Certified) -> Accepted:
+        end = self.guard.kept(zeta, start)
+        (self.actor_1, self.actor_2), self.linear = end.actors, end.linear
+        return end
 
     def observe(self, zeta: Array) -> LearnerStep:
         """Return what a step at ζ (n,) would see at the present samples, without moving anything."""

@@ -15,8 +15,9 @@ from .allocation import Allocator
 from .controller import Controller, ControllerScenario
 from .disturbance import DisturbanceSource, build_disturbance
 from .history import VehicleHistory
+from .measurement import Limits
 from .noise import MeasurementNoise
-from .observer import DisturbanceObserver
+from .observer import SINGULAR, DisturbanceObserver
 from .plant import HeldPlant
 from .settings import SimulationSettings
 
@@ -92,7 +93,8 @@ class VehicleSystem(System[VehiclePolicy]):
         self.thrusters = Allocator(vehicle or station.model.vehicle) if limited else None
         self.noise = MeasurementNoise(settings.noise)
         bandwidth = settings.observer_bandwidth
-        self.observer = DisturbanceObserver(station, bandwidth) if bandwidth else None
+        limits = Limits.of(station, settings.chi, SINGULAR)
+        self.observer = DisturbanceObserver(station, bandwidth, limits=limits) if bandwidth else None
         self.state = PlantState(scenario.initial_state, 0.0, 0.0)
 
     def command(self, policy: VehiclePolicy, period: float) -> Array:

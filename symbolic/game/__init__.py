@@ -6,7 +6,15 @@ from .domain import Bound, margins_and_shown, outside, require_numbers, require_
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import Problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
-from .sampled import MEAN_FROM, HeldLoop, fastest_mode, held_loop, longest_period, mean_matrix
+from .sampled import (
+    MEAN_FROM,
+    HeldLoop,
+    fastest_mode,
+    held_loop,
+    longest_hold,
+    longest_period,
+    mean_matrix,
+)
 from .stored import problem_from_data, problem_to_data
 
 __all__ = [
@@ -25,6 +33,7 @@ __all__ = [
     "gamma_star",
     "gamma_threshold",
     "held_loop",
+    "longest_hold",
     "longest_period",
     "margins_and_shown",
     "mean_matrix",
