@@ -43,7 +43,6 @@ def weights(one: Learner) -> Array:
     return np.concatenate([one.critic, one.actor_1, one.actor_2])
 
 
-@pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("gives", BAD)
 def test_weights_that_are_not_finite_are_not_taken(gives: float) -> None:
     law = Broken()
@@ -52,14 +51,10 @@ def test_weights_that_are_not_finite_are_not_taken(gives: float) -> None:
     before, information = weights(one), law.information
     law.gives = gives
     seen = one.step(STATE, 0.25)
-    if not np.isfinite(gives):  # 1e300 overflows in the actors' projection, or is finite
-        assert seen.rolled_back
-    if seen.rolled_back:
-        np.testing.assert_array_equal(weights(one), before)
-        assert law.information is information
-    assert np.isfinite(weights(one)).all()
+    assert seen.rolled_back
+    np.testing.assert_array_equal(weights(one), before)
+    assert law.information is information
     law.gives = None
-    assert np.isfinite(weights(one)).all()
     assert not one.step(STATE, 0.25).rolled_back
 
 

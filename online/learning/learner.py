@@ -19,6 +19,7 @@ from .safeguard import Accepted, Actors, Certified, Unguarded
 from .settings import LearnerSettings, SampleSettings
 
 logger = logging.getLogger("stationkeep")
+LARGEST = 1e100  # of a weight: what is computed from it stays finite
 
 
 class Learner:
@@ -101,7 +102,7 @@ class Learner:
             If ζ is not n finite numbers in the domain, or dt no positive time.
         """
         given = isinstance(zeta, np.ndarray) and zeta.shape == (self.problem.n_states,)
-        if not (given and math.isfinite(zeta.dot(zeta))):
+        if not (given and math.isfinite(sum(zeta.tolist()))):
             zeta = self.problem.require_state(zeta)
         dt = require_time_step(dt)
         # certify: the actors of before, or the reference's
@@ -127,14 +128,15 @@ class Learner:
         before = dict(getattr(self.law, "__dict__", {}))
         gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
         try:
-            # critic (19)
-            critic = self.law.step(self.critic, seen.equations, dt)
-            # actors (20)(21)
-            proposed = (
-                actor_step(actors[0], critic, gains[0], dt, self.projection),
-                actor_step(actors[1], critic, gains[1], dt, self.projection),
-            )
-            if all(np.isfinite(weights).all() for weights in (critic, *proposed)):
+            with np.errstate(over="ignore", invalid="ignore"):
+                # critic (19)
+                critic = self.law.step(self.critic, seen.equations, dt)
+                # actors (20)(21)
+                proposed = (
+                    actor_step(actors[0], critic, gains[0], dt, self.projection),
+                    actor_step(actors[1], critic, gains[1], dt, self.projection),
+                )
+            if all(np.abs(weights).max() < LARGEST for weights in (critic, *proposed)):
                 return critic, proposed
         except np.linalg.LinAlgError as error:
             logger.debug("a learning step was not taken: %s", error)

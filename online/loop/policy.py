@@ -135,7 +135,7 @@ class LearnedPolicy:
         """
         if not (isinstance(zeta, np.ndarray) and zeta.shape == self.zeta.shape):
             zeta = self.learner.problem.require_state(zeta)
-        if not math.isfinite(zeta.dot(zeta)):
+        if not math.isfinite(sum(zeta.tolist())):
             zeta = self.learner.problem.require_state(zeta)
         if not (isinstance(dt, float) and 0.0 < dt < math.inf):
             dt = require_time_step(dt)
@@ -144,7 +144,7 @@ class LearnedPolicy:
             seen, since = self._learned(zeta, since, learn=learn), 0.0
         mean = self._mean_state(zeta, dt)
         u_control, u_disturbance = self.learner.policies(mean)
-        if not math.isfinite(u_control.dot(u_control) + u_disturbance.dot(u_disturbance)):
+        if not math.isfinite(sum(u_control.tolist()) + sum(u_disturbance.tolist())):
             K_1, K_2 = self.learner.problem.linear_gains
             u_control, u_disturbance = -K_1 @ mean, K_2 @ mean
         self.zeta, self.last_step, self._since = zeta, seen, since

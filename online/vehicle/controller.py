@@ -155,7 +155,7 @@ class Controller:
         u_control = self.learned.step(seen.policy, seen.dt, learn=seen.teaches)
         (J,) = self.setup.model.kinematics(seen.zeta[:6])
         tau_b = np.asarray(J.T @ (u_control + self.setup.model.u_trim))
-        if not math.isfinite(tau_b.dot(tau_b)):
+        if not math.isfinite(sum(tau_b.tolist())):
             raise RunError("the wrench is not finite; start from other weights")
         self._gate.keep(seen)
         self.zeta, self._J = seen.zeta, J

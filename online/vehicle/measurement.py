@@ -184,7 +184,7 @@ def require_measurement(eta: ArrayLike, eta_dot: ArrayLike) -> Array:
             f"eta and eta_dot must have 6 entries each, but have {pose.shape} and {rate.shape}"
         )
     measured = np.concatenate((pose, rate))
-    if not measured.dot(measured) <= LARGEST**2:  # written so that NaN is not accepted
+    if not math.hypot(*measured.tolist()) <= LARGEST:  # written so that NaN is not accepted
         _require_sizes(measured, "eta and eta_dot")
     return measured
 
@@ -194,7 +194,7 @@ def require_state(zeta: ArrayLike) -> Array:
     state = _numbers(zeta)
     if state is None or state.shape != (12,):
         raise InputError(f"zeta must be 12 numbers ({','.join(STATE_NAMES)})")
-    if not state.dot(state) <= LARGEST**2:
+    if not math.hypot(*state.tolist()) <= LARGEST:
         _require_sizes(state, "zeta")
     return state.copy()
 
