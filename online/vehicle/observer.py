@@ -37,8 +37,6 @@ from .measurement import (
     require_wrench,
 )
 
-SINGULAR = 90.0  # deg; a pitch at which the Euler angles are
-
 
 class DisturbanceObserver:
     """Estimate what disturbs a vehicle, under any policy.
@@ -76,7 +74,7 @@ class DisturbanceObserver:
         self.bandwidth = bandwidth
         self.estimate = np.zeros(6)
         self.flags: Flags = ()
-        self._gate = MeasurementGate(station, limits or Limits.of(station, pitch=SINGULAR))
+        self._gate = MeasurementGate(station, limits or Limits.of(station))
         self._missing = _missing_force(station)
         self._zeta: Array | None = None
         self._tau_b: Array | None = None
@@ -91,7 +89,7 @@ class DisturbanceObserver:
         ------
         InputError
             If ζ is not 12 finite numbers of a size that can be measured, dt is no positive time, or the
-            pitch is beyond ±90 degrees; nothing changes.
+            pitch is beyond its limit; nothing changes.
         """
         state, dt = require_state(zeta), require_dt(dt)
         seen = self._gate.look(state, dt)
@@ -103,10 +101,11 @@ class DisturbanceObserver:
         return self.estimate.copy()
 
     def _estimated(self, last: Array, zeta: Array, tau_b: Array, dt: float) -> Array:
-        acceleration = (zeta[6:] - last[6:]) / dt
-        ends = [self._missing(end, acceleration, tau_b)[0] for end in (last, zeta)]
-        gap = 0.5 * (ends[0] + ends[1]) - self.estimate
-        estimate = self.estimate - np.expm1(-self.bandwidth * dt) * gap
+        with np.errstate(over="ignore", invalid="ignore"):  # of a tiny dt
+            acceleration = (zeta[6:] - last[6:]) / dt
+            ends = [self._missing(end, acceleration, tau_b)[0] for end in (last, zeta)]
+            gap = 0.5 * (ends[0] + ends[1]) - self.estimate
+            estimate = self.estimate - np.expm1(-self.bandwidth * dt) * gap
         return np.asarray(estimate) if np.isfinite(estimate).all() else self.estimate
 
     def applied(self, tau_b: ArrayLike) -> None:
