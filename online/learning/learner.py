@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ...symbolic.game import require_time_step
 from ..laws import Critic, actor_step
 from ..paper import Residual, value
 from ..rows import Observation, Predictor, Weights
+from ..vector import library
 from . import build
 from .learner_step import LearnerStep
 from .safeguard import Accepted, Actors, Certified, Unguarded
@@ -76,7 +78,7 @@ class Learner:
         self.critic, self.actor_1, self.actor_2 = start.copy(), start.copy(), start.copy()
         self._initial = (self.actor_1, self.actor_2)
         self.linear = False
-        paths = SampleSettings() if paths is None else paths
+        self._paths = paths = SampleSettings() if paths is None else paths
         self.predictor = Predictor(self.functions, settings.horizon, settings.steps)
         self.source = build.row_source(
             settings, self.functions, samples, paths, self.predictor, reference
@@ -90,6 +92,24 @@ class Learner:
     def game(self) -> Game:
         """The game that is learned."""
         return self.problem.game
+
+    def build(self) -> Iterator[str]:
+        """Build what steps need, so that none has to, and yield the functions' names.
+
+        Beside policies, σ' and the vector code, which have no names of their own here.
+        """
+        s, paths, origin = self.settings, self._paths, np.zeros(self.problem.n_states)
+        self.policies(origin)
+        self.functions.at(origin[None, :])
+        if self.functions.compiled:
+            library()
+            if s.error == "bellman":
+                self.functions.many_terms  # noqa: B018 - built when first asked for
+                self.functions.terms  # noqa: B018
+                yield "sparse_terms"
+        n_paths = paths.paths if s.error == "costate" else int(paths.remember)
+        if s.safeguard or n_paths:
+            yield from self.predictor.path_rows(paths.path_points).build(n_paths)
 
     def step(self, zeta: Array, dt: float) -> LearnerStep:
         """Learn for dt [s] from the state ζ (n,) and the samples: the algorithm.

@@ -105,6 +105,11 @@ class LearnedPolicy:
         # nothing to certify where the frozen weights are the reference's own
         safeguarded = not learn and scenario.learner.safeguard
         self.certify = safeguarded and weights is not None and weights is not reference
+        # now, not in the first step
+        if learn or self.certify:
+            list(self.learner.build())
+        else:
+            self.learner.policies(np.zeros(setup.problem.n_states))
         self.period = learning_period(setup.problem, scenario.learner)
         self._since: float | None = None
         self._mean_state = MeanState(setup.problem)

@@ -105,6 +105,8 @@ class Controller:
         self.zeta = np.zeros(12)
         self._J = np.eye(6)
         self._gate = MeasurementGate(self.setup, self.limits)
+        # built now, not in the first step
+        self._u_trim, self._kinematics = self.setup.model.u_trim, self.setup.model.kinematics
 
     @property
     def pitch_limit(self) -> float:
@@ -153,8 +155,8 @@ class Controller:
         measured, dt = require_measurement(eta, eta_dot), require_dt(dt)
         seen = self._gate.look(self._error(measured), dt)
         u_control = self.learned.step(seen.policy, seen.dt, learn=seen.teaches)
-        (J,) = self.setup.model.kinematics(seen.zeta[:6])
-        tau_b = np.asarray(J.T @ (u_control + self.setup.model.u_trim))
+        (J,) = self._kinematics(seen.zeta[:6])
+        tau_b = np.asarray(J.T @ (u_control + self._u_trim))
         if not math.isfinite(sum(tau_b.tolist())):
             raise RunError("the wrench is not finite; start from other weights")
         self._gate.keep(seen)

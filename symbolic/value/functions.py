@@ -133,6 +133,10 @@ class ValueFunctions:
         self.sampler(n_samples)
         yield self._exports["sample_kernel"]
 
+    def exported(self, name: str) -> Export:
+        """Return what became of a function that is built."""
+        return self._exports[name]
+
     def _gradient(self, weights: SX) -> SX:
         sigma, zeta = self.basis.sigma, self.problem.zeta
         return casadi.gradient(casadi.dot(weights, sigma), zeta)

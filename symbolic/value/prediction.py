@@ -13,7 +13,7 @@ gradient of the Bellman equation r + V_ζ F = 0 along the path, so λ is what V_
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -79,6 +79,25 @@ class Prediction:
         """The steps over the horizon, (N,) [s]."""
         return self.stepping.steps
 
+    def build(self, n_points: Sequence[int]) -> Iterator[str]:
+        """Build what a path and its cost need, and yield the names of the functions.
+
+        Parameters
+        ----------
+        n_points : numbers of points for which rows will be asked; costates and rows only if any
+        """
+        self._path_kernel  # noqa: B018 - built when first asked for
+        yield "predicted_path"
+        if self.problem.same_inputs:
+            self._linear_kernel  # noqa: B018
+            yield "predicted_linear_path"
+        if n_points:
+            self._costate_kernel  # noqa: B018
+            yield "predicted_costates"
+            for number in n_points:
+                self._row_kernel(number)
+            yield "costate_rows"
+
     def path(self, zeta: Array, actor_1: Array, actor_2: Array) -> PredictedPath:
         """Return the path from ζ (n,) under Ŵ_a1, Ŵ_a2 (m,)."""
         (nodes,) = _called(self._path_kernel, zeta, actor_1, actor_2)
@@ -101,9 +120,7 @@ class Prediction:
         the value with the gradient λ.
         """
         n_points, k, m = len(points), self.problem.n_inputs, self.basis.n_basis
-        if n_points not in self._row_kernels:
-            self._row_kernels[n_points] = self._rows_of(n_points)
-        kernel = self._row_kernels[n_points]
+        kernel = self._row_kernel(n_points)
         kernel.inputs[0].T[...] = points
         kernel.inputs[1].T[...] = costates
         kernel.evaluate()
@@ -236,6 +253,11 @@ class Prediction:
 
     def _operations(self, rates: casadi.Function) -> int:
         return int(4 * len(self.steps) * rates.n_instructions())
+
+    def _row_kernel(self, n_points: int) -> Kernel:
+        if n_points not in self._row_kernels:
+            self._row_kernels[n_points] = self._rows_of(n_points)
+        return self._row_kernels[n_points]
 
     def _rows_of(self, n_points: int) -> Kernel:
         problem, n = self.problem, self.problem.n_states
