@@ -68,7 +68,7 @@ class Controller:
     learned : the learner's policy in the station's frame
     limits : up to where a measurement is taken as it is
     flags : of the last step that was answered, empty for an ordinary one
-    counts : how many steps have had each flag
+    counts : how many steps have had each flag; logged at 1, 10, 100, ...
     zeta : (12,) the last state, measured pose error and rates in the station's frame
 
     Examples
@@ -164,9 +164,9 @@ class Controller:
         last = self.learned.last_step
         rolled_back = last is not None and last.rolled_back
         if seen.flags or rolled_back or self.flags:
-            before, self.flags = self.flags, (*seen.flags, *(("rollback",) if rolled_back else ()))
+            self.flags = (*seen.flags, *(("rollback",) if rolled_back else ()))
             self.counts.update(self.flags)
-            tell(before, self.flags)
+            tell(self.counts, self.flags)
         return tau_b
 
     def body_wrench(self, u: Array) -> Array:

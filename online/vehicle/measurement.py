@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections import Counter
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -212,11 +213,12 @@ def require_dt(dt: float) -> float:
     return dt if isinstance(dt, float) and 0.0 < dt < math.inf else require_time_step(dt)
 
 
-def tell(before: Flags, now: Flags) -> None:
-    """Log the flags that were not there before, as warnings."""
-    for flag in now:
-        if flag not in before:
-            logger.warning("%s: %s", flag, TOLD[flag])
+def tell(counts: Counter[str], flags: Flags) -> None:
+    """Log flags as warnings, each the first, the 10th, the 100th, ... time."""
+    for flag in flags:
+        times = str(counts[flag])
+        if times.rstrip("0") == "1":
+            logger.warning("%s: %s (%s so far)", flag, TOLD[flag], times)
 
 
 def _numbers(value: ArrayLike) -> Array | None:
