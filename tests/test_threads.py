@@ -10,11 +10,12 @@ import casadi
 import numpy as np
 import pytest
 from casadi import SX
+from stationkeep.comparison import Scenario
 from stationkeep.online import Controller
 from stationkeep.symbolic import Kernel
 from stationkeep.symbolic.compiled import export
 
-from .games import Array, quick_scenario
+from .games import QUICK, Array, quick_scenario
 
 N_THREADS = 2
 
@@ -62,6 +63,14 @@ def test_threads_give_what_one_thread_gives(learn: bool, steps: int, hurried: No
     found = together(lambda i: wrenches(controllers[i], i, steps))
     for one, other in zip(alone, found, strict=True):
         np.testing.assert_array_equal(other, one)
+
+
+def test_controllers_are_made_in_threads(hurried: None) -> None:
+    """What is compiled when it is first used may be first used by two at once."""
+    alone = wrenches(Controller(quick_scenario()), 0, 2)
+    scenario = Scenario.load("bluerov2-heavy", [*QUICK])
+    for found in together(lambda i: wrenches(Controller(scenario), 0, 2)):
+        np.testing.assert_array_equal(found, alone)
 
 
 def test_controllers_of_one_scenario_do_not_touch_each_other() -> None:
