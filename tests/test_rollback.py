@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from stationkeep.online import Learner, LearnerSettings, LearnerStep
+from stationkeep.online import LearnedPolicy, Learner, LearnerSettings, LearnerStep, SampleSettings
 from stationkeep.online.laws import Equations, LeastSquares, NormalEquations
 from stationkeep.online.learning.memory import EVERY, EnvelopeMemory
 from stationkeep.online.rows import PathRows
-from stationkeep.symbolic import InputError
+from stationkeep.symbolic import InputError, Setup
 
 from .games import TWO_STATE_WEIGHTS, Array, plain, two_state
 
@@ -134,6 +137,57 @@ def test_weights_to_start_from_are_finite(
         with pytest.raises(InputError, match="contain NaN or infinity") as caught:
             Learner(problem, basis, plain(), POINTS, reference, initial, functions)
         one_sentence(caught.value)
+
+
+def test_steps_that_are_not_taken_are_counted_and_told(caplog: pytest.LogCaptureFixture) -> None:
+    law = Broken()
+    one, law.gives = learner(plain(), law), np.nan
+    with caplog.at_level(logging.WARNING, logger="stationkeep"):
+        for _ in range(25):
+            one.step(STATE, 0.25)
+    assert one.rolled_back == 25
+    assert [record.args for record in caplog.records] == [(1,), (10,)]
+
+
+def learned_policy() -> LearnedPolicy:
+    """Return the learner's policy of the two-state game."""
+    problem, basis, _ = two_state()
+    setup = Setup(problem=problem, basis=basis, envelope=np.ones(2), compiled=False)
+    scenario = SimpleNamespace(
+        learner=plain(),
+        samples=SampleSettings(number=40),
+        setup=lambda: setup,
+        initial_weights=lambda: None,
+        critic_law=lambda: None,
+    )
+    return LearnedPolicy(scenario)
+
+
+@pytest.mark.parametrize(
+    ("state", "dt"),
+    [
+        ([np.nan, 0.0], 0.02),
+        ([0.0, -np.inf], 0.02),
+        ([0.0], 0.02),
+        ("ab", 0.02),
+        (STATE, 0.0),
+        (STATE, np.nan),
+        (STATE, "0.02"),
+        (STATE, None),
+    ],
+)
+def test_a_policy_of_any_problem_refuses_and_changes_nothing(
+    state: Any, dt: Any, one_sentence: Callable[[BaseException], str]
+) -> None:
+    one, twin = learned_policy(), learned_policy()
+    for i in range(20):
+        given = one.step(0.95**i * STATE, 0.05)
+        with pytest.raises(InputError) as caught:
+            one.step(state, dt)
+        one_sentence(caught.value)
+        np.testing.assert_array_equal(given, twin.step(0.95**i * STATE, 0.05))
+        np.testing.assert_array_equal(one.zeta, twin.zeta)
+    np.testing.assert_array_equal(weights(one.learner), weights(twin.learner))
 
 
 class Rows(PathRows):

@@ -45,6 +45,8 @@ class Learner:
     ----------
     critic, actor_1, actor_2 : (m,) Ŵ_c, Ŵ_a1, Ŵ_a2
     linear : whether the linear H-infinity policy is in use instead of the actors'
+    rolled_back : how many steps were not taken, since they would not have been finite; logged at 1, 10,
+        100, ...
     source, law, projection, guard, memory : what a step consists of
 
     Raises
@@ -77,7 +79,7 @@ class Learner:
             )
         self.critic, self.actor_1, self.actor_2 = start.copy(), start.copy(), start.copy()
         self._initial = (self.actor_1, self.actor_2)
-        self.linear = False
+        self.linear, self.rolled_back = False, 0
         self._paths = paths = SampleSettings() if paths is None else paths
         self.predictor = Predictor(self.functions, settings.horizon, settings.steps)
         self.source = build.row_source(
@@ -159,9 +161,15 @@ class Learner:
             if all(np.abs(weights).max() < LARGEST for weights in (critic, *proposed)):
                 return critic, proposed
         except np.linalg.LinAlgError as error:
-            logger.debug("a learning step was not taken: %s", error)
+            logger.debug("the rows of a learning step can't be solved: %s", error)
         if before:
             vars(self.law).update(before)
+        self.rolled_back += 1
+        if str(self.rolled_back).rstrip("0") == "1":
+            logger.warning(
+                "a learning step would not have been finite and was not taken (%d so far)",
+                self.rolled_back,
+            )
         return None
 
     def certify(self, zeta: Array) -> LearnerStep:

@@ -166,7 +166,7 @@ class Controller:
         if seen.flags or rolled_back or self.flags:
             self.flags = (*seen.flags, *(("rollback",) if rolled_back else ()))
             self.counts.update(self.flags)
-            tell(self.counts, self.flags)
+            tell(self.counts, seen.flags)
         return tau_b
 
     def body_wrench(self, u: Array) -> Array:

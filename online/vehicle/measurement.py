@@ -41,7 +41,6 @@ TOLD: dict[Flag, str] = {
     "jump": "the measured state is not where the last one leads",
     "far": "the position is too far from the station, and the wrench limited",
     "rate": "a measured rate is too large, and the wrench limited",
-    "rollback": "a learning step would not have been finite, and was not taken",
 }
 LARGEST = 1e9  # of any measured number [m, rad, m/s, rad/s]
 LONGEST_GAP = 1.0  # s
