@@ -10,7 +10,7 @@ from ...comparison import generate
 from ...symbolic.compiled import cache_folder
 from ..output import load_scenario, output_folder, print_json, print_table, progress
 
-EXPECTED = 11  # functions of a vehicle
+EXPECTED = 15  # functions of a vehicle
 
 
 def run(options: argparse.Namespace) -> int:

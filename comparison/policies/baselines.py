@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...online import Policy
 from ...online.loop import Feedback, MeanState
-from ...symbolic import Game, Problem, StationKeeping
+from ...online.vehicle import Flags, Limits, MeasurementGate, require_dt, require_measurement
+from ...symbolic import Game, Problem, RunError, StationKeeping
 from ...symbolic.arrays import Array
-from ...symbolic.game import AngleTracker
 
 
 class LinearPolicy(Feedback):
@@ -46,17 +47,27 @@ class LQR(LinearPolicy):
 class OnVehicle:
     """A policy u_1(ζ) as what drives a vehicle: the trim is added, and forces go into the body frame.
 
-    Attributes
+    Measurements are refused, limited and flagged by the rules of a `Controller`.
+
+    Parameters
     ----------
     policy : that is asked
     station : vehicle and game
+    limits : where measurements are flagged; those of vehicle and game if None
+
+    Attributes
+    ----------
+    policy, station, limits : as given
     zeta : (12,) the last state, its attitude as it continues the one before (`AngleTracker`)
+    flags : of the last step
     """
 
-    def __init__(self, policy: Policy, station: StationKeeping) -> None:
+    def __init__(self, policy: Policy, station: StationKeeping, limits: Limits | None = None) -> None:
         self.policy, self.station = policy, station
+        self.limits = Limits.of(station) if limits is None else limits
         self.zeta = np.zeros(12)
-        self._angles = AngleTracker(station.problem.angles)
+        self.flags: Flags = ()
+        self._gate = MeasurementGate(station, self.limits)
 
     @property
     def u_control(self) -> Array:
@@ -68,10 +79,26 @@ class OnVehicle:
         """The policy's u_2 at the last state, (6,) [N, N m]."""
         return self.policy.u_disturbance
 
-    def step(self, eta: Array, eta_dot: Array, dt: float) -> Array:
-        """Return the body wrench J'(u_1 + u_trim) to hold for dt, shape (6,)."""
-        self.zeta = self._angles.enter(np.concatenate([eta, eta_dot]))
-        return self.body_wrench(self.policy.step(self.zeta, dt) + self.station.model.u_trim)
+    def step(self, eta: ArrayLike, eta_dot: ArrayLike, dt: float) -> Array:
+        """Return the body wrench J'(u_1 + u_trim) to hold for dt, shape (6,).
+
+        Raises
+        ------
+        InputError
+            For what can't be a measurement, as `Controller.step`; nothing changes.
+        RunError
+            If the policy's wrench is not finite.
+        """
+        measured, dt = require_measurement(eta, eta_dot), require_dt(dt)
+        seen = self._gate.look(measured, dt)
+        u_control = self.policy.step(seen.policy, seen.dt)
+        (J,) = self.station.model.kinematics(seen.zeta[:6])
+        tau_b = np.asarray(J.T @ (u_control + self.station.model.u_trim))
+        if not np.isfinite(tau_b).all():
+            raise RunError("the policy asks for a wrench that is not finite")
+        self._gate.keep(seen)
+        self.zeta, self.flags = seen.zeta, seen.flags
+        return tau_b
 
     def body_wrench(self, u: Array) -> Array:
         """Return J(η)'u at the last state, shape (6,)."""

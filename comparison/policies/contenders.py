@@ -8,6 +8,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ...online import AS_PRINTED, Controller, LearnedPolicy, Policy, VehiclePolicy
+from ...online.vehicle import Limits
 from ...symbolic import InputError, Setup, StationKeeping
 from ...symbolic.errors import nearest
 from ...symbolic.pyfile import is_named
@@ -54,8 +55,10 @@ class Contender:
         vehicle = setup if isinstance(setup, StationKeeping) else None
         if self.law is None:
             return LearnedPolicy(scenario) if vehicle is None else Controller(scenario)
-        law = self.law(setup)
-        return law if vehicle is None else OnVehicle(law, vehicle)
+        law, run = self.law(setup), scenario.simulation
+        if vehicle is None:
+            return law
+        return OnVehicle(law, vehicle, Limits.of(vehicle, run.chi, run.pitch_limit))
 
 
 def _pid(setup: Setup) -> Policy:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from ...online import Learner
+from ...online.laws import Gradient
+from ...online.learning import RULES
 from ...online.records import write_text
 from ...symbolic import Export, InputError, Model, Setup, StationKeeping
 from ...symbolic.compiled import cache_folder
@@ -37,7 +42,10 @@ def generate(
     compiled: bool = True,
     progress: Callable[[int], None] | None = None,
 ) -> Generated:
-    """Generate, compile and verify f, g, their Jacobians, the basis, policies and the sample kernel.
+    """Generate, compile and verify f, g, their Jacobians, the basis, policies and what learning needs.
+
+    That are the sample kernel and the predictions; the learner's vector code is compiled beside them. A
+    controller of the scenario then compiles nothing.
 
     Parameters
     ----------
@@ -53,13 +61,31 @@ def generate(
     """
     one = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
     functions: list[Export] = []
-    for described in _rebuilt(one.setup(), compiled).exports(max(one.samples.number, 1)):
+    for described in _exports(one, _rebuilt(one.setup(), compiled)):
         functions.append(described)
         if progress is not None:
             progress(len(functions))
     if out is not None:
         _copy_sources(functions, Path(out))
     return Generated(functions)
+
+
+def _exports(scenario: Scenario, setup: Setup) -> Iterator[Export]:
+    """Build every function of a scenario and yield what became of it."""
+    yield from setup.exports(max(scenario.samples.number, 1))
+    settings, reference = scenario.learner, setup.riccati_weights
+    none = np.zeros((0, setup.problem.n_states))
+    learner = Learner(
+        setup.problem,
+        setup.basis,
+        settings,
+        none,
+        reference,
+        functions=setup.functions,
+        paths=scenario.samples,
+        critic=None if settings.rule in RULES else Gradient(),
+    )
+    yield from map(setup.functions.exported, learner.build())
 
 
 def _rebuilt(setup: Setup, compiled: bool) -> Setup:

@@ -23,10 +23,17 @@ from .equations import Equations
 
 
 class Critic(Protocol):
-    """A critic law; a learner takes any."""
+    """A critic law; a learner takes any.
+
+    A learner does not take weights that are not finite. What a law keeps in its attributes is then put
+    back too; it should hold arrays there that are replaced, not written into.
+    """
 
     def step(self, critic: Array, rows: Equations, dt: float) -> Array:
-        """Return Ŵ_c after dt [s] with these rows, shape (m,)."""
+        """Return Ŵ_c after dt [s] with these rows, shape (m,).
+
+        May raise numpy.linalg.LinAlgError where the rows can't be solved: the step is not taken.
+        """
         ...
 
 
@@ -80,16 +87,17 @@ class LeastSquares:
         Raises
         ------
         numpy.linalg.LinAlgError
-            If the information matrix is not positive definite.
+            If the information matrix would not be finite and positive definite; it stays as it is.
         """
         fraction = min(1.0, self.covariance_norm / self.covariance_bound)
         # a late step may not forget more than the bound leaves
         decay = max(np.exp(-self.forgetting * (1.0 - fraction) * dt), fraction)
         factor = -dt * (1.0 - decay) / np.log(decay) if decay < 1.0 else dt
         # a new array: who has seen the old one keeps it
-        self.information = decay * self.information + factor * rows.matrix
-        self._factor, failed = lapack.dpotrf(self.information.T, lower=1)
-        if failed:
-            raise np.linalg.LinAlgError("the information matrix is not positive definite")
+        information = decay * self.information + factor * rows.matrix
+        lower, failed = lapack.dpotrf(information.T, lower=1)
+        if failed or not np.isfinite(lower).all():
+            raise np.linalg.LinAlgError("the information matrix is not finite and positive definite")
+        self.information, self._factor = information, lower
         pull, _ = lapack.dpotrs(self._factor, rows.gradient, lower=1)
         return np.asarray(critic - factor * pull)

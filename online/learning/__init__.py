@@ -4,11 +4,12 @@ from .learner import Learner
 from .learner_step import LearnerStep
 from .monitor import Monitor, MonitorSample
 from .pace import learning_period, paid_share
-from .settings import AS_PRINTED, PERIOD, LearnerSettings, SampleSettings
+from .settings import AS_PRINTED, PERIOD, RULES, LearnerSettings, SampleSettings
 
 __all__ = [
     "AS_PRINTED",
     "PERIOD",
+    "RULES",
     "Learner",
     "LearnerSettings",
     "LearnerStep",

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from ...symbolic import Basis, Game, Problem, ValueFunctions
+import logging
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...symbolic import Basis, Game, InputError, Problem, ValueFunctions
 from ...symbolic.arrays import Array
+from ...symbolic.game import require_time_step
 from ..laws import Critic, actor_step
 from ..paper import Residual, value
 from ..rows import Observation, Predictor, Weights
+from ..vector import library
 from . import build
 from .learner_step import LearnerStep
-from .safeguard import Accepted, Certified, Unguarded
+from .safeguard import Accepted, Actors, Certified, Unguarded
 from .settings import LearnerSettings, SampleSettings
+
+logger = logging.getLogger("stationkeep")
+LARGEST = 1e100  # of a weight: what is computed from it stays finite
 
 
 class Learner:
@@ -34,7 +45,14 @@ class Learner:
     ----------
     critic, actor_1, actor_2 : (m,) Ŵ_c, Ŵ_a1, Ŵ_a2
     linear : whether the linear H-infinity policy is in use instead of the actors'
+    rolled_back : how many steps were not taken, since they would not have been finite; logged at 1, 10,
+        100, ...
     source, law, projection, guard, memory : what a step consists of
+
+    Raises
+    ------
+    InputError
+        If the weights to start from, or those of reference, are not finite.
     """
 
     def __init__(
@@ -54,10 +72,15 @@ class Learner:
         self.functions = ValueFunctions(problem, basis) if functions is None else functions
         self.reference = reference
         start = reference * settings.weight_factor if initial is None else initial
+        if not (np.isfinite(start).all() and np.isfinite(reference).all()):
+            raise InputError(
+                "the weights to start from contain NaN or infinity; take them from another record, or "
+                'start from learner.weights = "riccati"'
+            )
         self.critic, self.actor_1, self.actor_2 = start.copy(), start.copy(), start.copy()
         self._initial = (self.actor_1, self.actor_2)
-        self.linear = False
-        paths = SampleSettings() if paths is None else paths
+        self.linear, self.rolled_back = False, 0
+        self._paths = paths = SampleSettings() if paths is None else paths
         self.predictor = Predictor(self.functions, settings.horizon, settings.steps)
         self.source = build.row_source(
             settings, self.functions, samples, paths, self.predictor, reference
@@ -72,27 +95,82 @@ class Learner:
         """The game that is learned."""
         return self.problem.game
 
+    def build(self) -> Iterator[str]:
+        """Build what steps need, so that none has to, and yield the functions' names.
+
+        Beside policies, σ' and the vector code, which have no names of their own here.
+        """
+        s, paths, origin = self.settings, self._paths, np.zeros(self.problem.n_states)
+        self.policies(origin)
+        self.functions.at(origin[None, :])
+        if self.functions.compiled:
+            library()
+            if s.error == "bellman":
+                self.functions.many_terms  # noqa: B018 - built when first asked for
+                self.functions.terms  # noqa: B018
+                yield "sparse_terms"
+        n_paths = paths.paths if s.error == "costate" else int(paths.remember)
+        if s.safeguard or n_paths:
+            yield from self.predictor.path_rows(paths.path_points).build(n_paths)
+
     def step(self, zeta: Array, dt: float) -> LearnerStep:
-        """Learn for dt [s] from the state ζ (n,) and the samples: the algorithm."""
+        """Learn for dt [s] from the state ζ (n,) and the samples: the algorithm.
+
+        A step that would leave weights or information not finite is not taken: all stay as they were.
+
+        Raises
+        ------
+        InputError
+            If ζ is not n finite numbers in the domain, or dt no positive time.
+        """
+        given = isinstance(zeta, np.ndarray) and zeta.shape == (self.problem.n_states,)
+        if not (given and math.isfinite(sum(zeta.tolist()))):
+            zeta = self.problem.require_state(zeta)
+        dt = require_time_step(dt)
         # certify: the actors of before, or the reference's
         start = self.guard.certified(zeta, (self.actor_1, self.actor_2))
         weights = (self.critic, *start.actors)
         # rows of (17)
         self.source.move(zeta, weights)
         seen = self.source.at(zeta, weights)
-        # critic (19)
-        self.critic = self.law.step(self.critic, seen.equations, dt)
-        # actors (20)(21)
-        gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
-        proposed = (
-            actor_step(start.actors[0], self.critic, gains[0], dt, self.projection),
-            actor_step(start.actors[1], self.critic, gains[1], dt, self.projection),
-        )
-        # accept what is certified of their way
-        end = self.guard.accepted(zeta, start, proposed)
+        # critic (19), actors (20)(21)
+        moved = self._moved(seen, start.actors, dt)
+        if moved is None:
+            end = self.guard.kept(zeta, start)
+        else:
+            # accept what is certified of their way
+            self.critic, proposed = moved
+            end = self.guard.accepted(zeta, start, proposed)
         (self.actor_1, self.actor_2), self.linear = end.actors, end.linear
         self.memory.step()
-        return self._recorded(weights, seen, start, end)
+        return self._recorded(weights, seen, start, end, rolled_back=moved is None)
+
+    def _moved(self, seen: Observation, actors: Actors, dt: float) -> tuple[Array, Actors] | None:
+        """Return critic and proposed actors after dt [s], or None, the law put back, if not finite."""
+        before = dict(getattr(self.law, "__dict__", {}))
+        gains = (self.settings.gain_actor_1, self.settings.gain_actor_2)
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                # critic (19)
+                critic = self.law.step(self.critic, seen.equations, dt)
+                # actors (20)(21)
+                proposed = (
+                    actor_step(actors[0], critic, gains[0], dt, self.projection),
+                    actor_step(actors[1], critic, gains[1], dt, self.projection),
+                )
+            if all(np.abs(weights).max() < LARGEST for weights in (critic, *proposed)):
+                return critic, proposed
+        except np.linalg.LinAlgError as error:
+            logger.debug("the rows of a learning step can't be solved: %s", error)
+        if before:
+            vars(self.law).update(before)
+        self.rolled_back += 1
+        if str(self.rolled_back).rstrip("0") == "1":
+            logger.warning(
+                "a learning step would not have been finite and was not taken (%d so far)",
+                self.rolled_back,
+            )
+        return None
 
     def certify(self, zeta: Array) -> LearnerStep:
         """Use the initial weights where they are predicted to cost less than the reference, else that.
@@ -100,10 +178,18 @@ class Learner:
         For a learner that is not to learn, with a safeguard.
         """
         start = self.guard.certified(zeta, self._initial)
-        end = self.guard.kept(zeta, start)
-        (self.actor_1, self.actor_2), self.linear = end.actors, end.linear
+        end = self._used(zeta, start)
         weights = (self.critic, *end.actors)
         return self._recorded(weights, self.source.at(zeta, weights), start, end)
+
+    def keep(self, zeta: Array) -> None:
+        """Use the present weights, or what is predicted to cost less at ζ (n,), and learn nothing."""
+        self._used(zeta, self.guard.certified(zeta, (self.actor_1, self.actor_2)))
+
+    def _used(self, zeta: Array, start: Certified) -> Accepted:
+        end = self.guard.kept(zeta, start)
+        (self.actor_1, self.actor_2), self.linear = end.actors, end.linear
+        return end
 
     def observe(self, zeta: Array) -> LearnerStep:
         """Return what a step at ζ (n,) would see at the present samples, without moving anything."""
@@ -134,7 +220,13 @@ class Learner:
         return self.source.residual((self.critic, self.actor_1, self.actor_2))
 
     def _recorded(
-        self, weights: Weights, seen: Observation, start: Certified, end: Accepted
+        self,
+        weights: Weights,
+        seen: Observation,
+        start: Certified,
+        end: Accepted,
+        *,
+        rolled_back: bool = False,
     ) -> LearnerStep:
         """Return the step as it is recorded: what was seen, under which weights, and what was done."""
         return LearnerStep(
@@ -149,4 +241,5 @@ class Learner:
             accepted=end.part,
             fallback=(start.restarted and end.part == 0.0) or end.linear,
             linear=end.linear,
+            rolled_back=rolled_back,
         )

@@ -27,6 +27,8 @@ class LearnerStep:
     fallback : whether the policy in use after the step is that of the reference weights or the linear
         H-infinity policy, since no other was certified
     linear : whether it is the latter
+    rolled_back : whether the laws' step was not taken, because the weights or the information of it
+        would not have been finite
     """
 
     critic: Array
@@ -40,3 +42,4 @@ class LearnerStep:
     accepted: float = 1.0
     fallback: bool = False
     linear: bool = False
+    rolled_back: bool = False

@@ -16,6 +16,7 @@ How good they become is decided by the number of paths behind a fit: a few hundr
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
@@ -101,17 +102,23 @@ class EnvelopeMemory:
         for start in draw_samples(self._envelope, PATHS, int(self._rng.integers(2**31))):
             omega, target, weight = self._path_rows.at(start[None, :], self.weights, self.weights)
             weighted = omega * weight[:, None]
-            self._matrix += weighted.T @ omega
-            self._vector += weighted.T @ target
+            matrix, vector = weighted.T @ omega, weighted.T @ target
+            # one path that is not finite would be remembered for ever
+            if math.isfinite(matrix.trace() + vector @ vector):
+                self._matrix += matrix
+                self._vector += vector
         self._n_steps += 1
         if self._n_steps % EVERY == 0 and self._validation and self._matrix.any():
             self._improve()
 
     def _improve(self) -> None:
         leash = LEASH * np.diag(self._matrix) + 1e-12 * np.trace(self._matrix)
-        fitted = scipy.linalg.solve(
-            self._matrix + np.diag(leash), self._vector + leash * self._reference, assume_a="pos"
-        )
+        try:
+            fitted = scipy.linalg.solve(
+                self._matrix + np.diag(leash), self._vector + leash * self._reference, assume_a="pos"
+            )
+        except np.linalg.LinAlgError:  # few paths, and rounding in them
+            return
         for fraction in FRACTIONS:
             tried = self.weights + fraction * (fitted - self.weights)
             relative = self._relative_cost(tried)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Protocol
 
 import numpy as np
 
 from ...symbolic import InputError, Setup
 from ...symbolic.arrays import Array
+from ...symbolic.game import require_time_step
 from ..laws import Critic
 from ..learning import Learner, LearnerSettings, LearnerStep, SampleSettings, learning_period
 from ..rows import draw_samples
@@ -103,6 +105,11 @@ class LearnedPolicy:
         # nothing to certify where the frozen weights are the reference's own
         safeguarded = not learn and scenario.learner.safeguard
         self.certify = safeguarded and weights is not None and weights is not reference
+        # now, not in the first step
+        if learn or self.certify:
+            list(self.learner.build())
+        else:
+            self.learner.policies(np.zeros(setup.problem.n_states))
         self.period = learning_period(setup.problem, scenario.learner)
         self._since: float | None = None
         self._mean_state = MeanState(setup.problem)
@@ -116,22 +123,47 @@ class LearnedPolicy:
         """The policy itself, where a vehicle's controller has one inside."""
         return self
 
-    def step(self, zeta: Array, dt: float) -> Array:
+    def step(self, zeta: Array, dt: float, *, learn: bool = True) -> Array:
         """Return û_1 at ζ (n,) to hold for dt [s], shape (k,).
 
-        Learns at the first call, and then whenever `period` has passed since it last did.
+        Learns at the first call, and then whenever `period` has passed since it last did. Where weights
+        give what is not finite it is the linear H-infinity policy's.
+
+        Parameters
+        ----------
+        learn : False learns nothing from this state, from which a safeguard still chooses the policy
+
+        Raises
+        ------
+        InputError
+            If ζ is not n finite numbers in the domain, or dt no positive time; nothing changes.
         """
-        self.zeta, self.last_step = zeta, None
-        since = self.period if self._since is None else self._since + dt
-        if self.learn and since >= self.period * (1.0 - 1e-9):
-            self.last_step = self.learner.step(zeta, since)
-            since = 0.0
-        elif self.certify and since >= self.period * (1.0 - 1e-9):
-            self.last_step = self.learner.certify(zeta)
-            since = 0.0
-        self._since = since
-        self.u_control, self.u_disturbance = self.learner.policies(self._mean_state(zeta, dt))
-        return self.u_control
+        if not (isinstance(zeta, np.ndarray) and zeta.shape == self.zeta.shape):
+            zeta = self.learner.problem.require_state(zeta)
+        if not math.isfinite(sum(zeta.tolist())):
+            zeta = self.learner.problem.require_state(zeta)
+        if not (isinstance(dt, float) and 0.0 < dt < math.inf):
+            dt = require_time_step(dt)
+        seen, since = None, self.period if self._since is None else self._since + dt
+        if since >= self.period * (1.0 - 1e-9) and (self.learn or self.certify):
+            seen, since = self._learned(zeta, since, learn=learn), 0.0
+        mean = self._mean_state(zeta, dt)
+        u_control, u_disturbance = self.learner.policies(mean)
+        if not math.isfinite(sum(u_control.tolist()) + sum(u_disturbance.tolist())):
+            K_1, K_2 = self.learner.problem.linear_gains
+            u_control, u_disturbance = -K_1 @ mean, K_2 @ mean
+        self.zeta, self.last_step, self._since = zeta, seen, since
+        self.u_control, self.u_disturbance = u_control, u_disturbance
+        return u_control
+
+    def _learned(self, zeta: Array, since: float, *, learn: bool) -> LearnerStep | None:
+        """Learn or certify at ζ (n,), and return what was seen."""
+        if not self.learn:
+            return self.learner.certify(zeta)
+        if learn:
+            return self.learner.step(zeta, since)
+        self.learner.keep(zeta)
+        return None
 
 
 def _start(scenario: LearnerScenario, setup: Setup) -> tuple[Array, Array | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -54,6 +55,13 @@ class PathRows:
         self._nodes = edges[:-1]
         gaps = np.diff(np.append(0.0, np.cumsum(steps))[edges])
         self._spans = gaps if relative_to == "rest" else _trapezoids(gaps)
+
+    def build(self, paths: int) -> Iterator[str]:
+        """Build what so many paths at once need, and yield the names of the functions.
+
+        Rows of fewer paths too: some may be lost.
+        """
+        yield from self._prediction.build([k * len(self._nodes) for k in range(1, paths + 1)])
 
     def at(self, starts: Array, actor_1: Array, actor_2: Array) -> tuple[Array, Array, Array]:
         """Return ω (N, m), targets (N,) and weights (N,) of the paths from the rows of `starts`.

@@ -5,6 +5,7 @@ from .controller import Controller
 from .disturbance import Disturbance, KnownSource, build_disturbance
 from .history import VehicleHistory
 from .loop import VehiclePolicy, run
+from .measurement import Flag, Flags, Limits, MeasurementGate, require_dt, require_measurement
 from .noise import MeasurementNoise
 from .observer import DisturbanceObserver
 from .plant import HeldPlant, held_rates
@@ -17,8 +18,12 @@ __all__ = [
     "Disturbance",
     "DisturbanceObserver",
     "DisturbanceSettings",
+    "Flag",
+    "Flags",
     "HeldPlant",
     "KnownSource",
+    "Limits",
+    "MeasurementGate",
     "MeasurementNoise",
     "NoiseSettings",
     "SimulationSettings",
@@ -26,6 +31,8 @@ __all__ = [
     "VehiclePolicy",
     "build_disturbance",
     "held_rates",
+    "require_dt",
+    "require_measurement",
     "require_trim",
     "run",
     "shown_trim",

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...symbolic import InputError, StationKeeping
+from ...symbolic import InputError, RunError, StationKeeping
 from ...symbolic.arrays import Array
-from ...symbolic.game import AngleTracker
-from ...symbolic.underwater import require_pitch_within
 from ..learning import Learner, LearnerStep
 from ..loop import LearnedPolicy, LearnerScenario
+from .measurement import Flags, Limits, MeasurementGate, require_dt, require_measurement, tell
 from .settings import SimulationSettings
 
 
@@ -36,6 +37,22 @@ class Controller:
     An attitude is one thing however it is written: the first measurement is taken the short way from
     the station, further ones as they continue it (`AngleTracker`).
 
+    What can't be a measurement is refused, and a refused call changes nothing. What a vehicle does not
+    do is answered within limits and flagged; h are the half-widths of the scenario's envelope, χ is
+    `simulation.chi`:
+
+    - `gap`: dt is longer than the linearised loop stays stable under a held wrench, at most 1 s. It
+      counts as that long, and angles are written the short way anew.
+    - `jump`: the pose is more than h from where the rates lead, or a rate 2 h from the last one. The
+      new pose holds, angles are written the short way anew, and nothing is learned from it.
+    - `far`: the position is more than χ h from the station. The policy sees it there, χ h away in its
+      direction, so that the wrench is bounded, and nothing is learned.
+    - `rate`: the velocity or the angular rate is more than χ h, and likewise seen as χ h.
+    - `rollback`: a learning step would have left weights or information not finite, and was not taken.
+
+    A controller shares nothing that changes with any other; controllers of one scenario may run in
+    threads of their own. One controller belongs to one thread at a time.
+
     Parameters
     ----------
     scenario : vehicle, game, basis, learner and samples
@@ -43,11 +60,16 @@ class Controller:
     learn : False keeps the initial weights (with the default ones, the policy -R^-1 g(ζ)'P ζ); with a
         safeguard, only from where they are predicted to cost less than the reference weights and the
         linear H-infinity policy
+    limits : where measurements are flagged; those of vehicle and game, χ and pitch of the scenario's
+        simulation, if None
 
     Attributes
     ----------
     learned : the learner's policy in the station's frame
-    pitch_limit : of the pitch up to which it holds the vehicle [deg], `simulation.pitch_limit`
+    limits : up to where a measurement is taken as it is
+    flags : of the last step that was answered, empty for an ordinary one
+    counts : how many steps have had each flag; logged at 1, 10, 100, ...
+    zeta : (12,) the last state, measured pose error and rates in the station's frame
 
     Examples
     --------
@@ -58,28 +80,38 @@ class Controller:
     def __init__(
         self,
         scenario: ControllerScenario,
-        station: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0),
+        station: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
         *,
         learn: bool = True,
+        limits: Limits | None = None,
     ) -> None:
-        if len(station) != 4 or not np.all(np.isfinite(station)):
-            raise InputError(f"the station is {station}, but must be four finite numbers x, y, z, psi")
+        self.station = _station(station)
         self.setup = scenario.station_keeping()
-        self.station = np.array(station, dtype=float)
-        c, s = np.cos(station[3]), np.sin(station[3])
+        c, s = np.cos(self.station[3]), np.sin(self.station[3])
         self._turn = np.eye(12)
         self._turn[:2, :2] = self._turn[6:8, 6:8] = [[c, s], [-s, c]]
         self._origin = np.zeros(12)
         self._origin[[0, 1, 2, 5]] = self.station
-        if station[3] != 0.0 and any(self.setup.model.current):
+        if self.station[3] != 0.0 and any(self.setup.model.current):
             raise InputError(
                 "a known current can't be combined with a station heading other than 0; turn the "
                 "earth frame so that its x axis is the heading to hold, and the current with it"
             )
         self.learned = LearnedPolicy(scenario, learn=learn)
+        run = scenario.simulation
+        self.limits = Limits.of(self.setup, run.chi, run.pitch_limit) if limits is None else limits
+        self.flags: Flags = ()
+        self.counts: Counter[str] = Counter()
+        self.zeta = np.zeros(12)
         self._J = np.eye(6)
-        self.pitch_limit = scenario.simulation.pitch_limit
-        self._angles = AngleTracker(self.setup.problem.angles)
+        self._gate = MeasurementGate(self.setup, self.limits)
+        # built now, not in the first step
+        self._u_trim, self._kinematics = self.setup.model.u_trim, self.setup.model.kinematics
+
+    @property
+    def pitch_limit(self) -> float:
+        """The pitch up to which it holds the vehicle [deg]."""
+        return self.limits.pitch
 
     @property
     def learner(self) -> Learner:
@@ -90,11 +122,6 @@ class Controller:
     def last_step(self) -> LearnerStep | None:
         """What the last learning step saw; None where the last step did not learn."""
         return self.learned.last_step
-
-    @property
-    def zeta(self) -> Array:
-        """The last state, (12,): pose error and rates in the station's frame."""
-        return self.learned.zeta
 
     @property
     def u_control(self) -> Array:
@@ -120,26 +147,27 @@ class Controller:
         Raises
         ------
         InputError
-            If the measurement is not finite or of the wrong shape, or the pitch is beyond its limit.
+            If pose and rate are not six finite numbers each, of a size that can be measured, dt is no
+            positive time, or the pitch is beyond its limit.
+        RunError
+            If the wrench is not finite.
         """
-        try:
-            pose, rate = np.asarray(eta, dtype=float), np.asarray(eta_dot, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError("eta and eta_dot must be 6 numbers each") from None
-        if not (dt > 0.0 and math.isfinite(dt)):
-            raise InputError(f"dt is {dt}, but must be a positive time in seconds")
-        if pose.shape != (6,) or rate.shape != (6,):
-            raise InputError(
-                f"eta and eta_dot must have 6 entries each, but have {pose.shape} and {rate.shape}"
-            )
-        measured = np.concatenate((pose, rate))
-        if not np.isfinite(measured).all():
-            raise InputError("eta and eta_dot must be finite, but contain NaN or infinity")
-        zeta = self._error(measured)
-        require_pitch_within(float(zeta[4]), self.pitch_limit)
-        (self._J,) = self.setup.model.kinematics(zeta[:6])
-        u_control = self.learned.step(zeta, dt)
-        return self.body_wrench(u_control + self.setup.model.u_trim)
+        measured, dt = require_measurement(eta, eta_dot), require_dt(dt)
+        seen = self._gate.look(self._error(measured), dt)
+        u_control = self.learned.step(seen.policy, seen.dt, learn=seen.teaches)
+        (J,) = self._kinematics(seen.zeta[:6])
+        tau_b = np.asarray(J.T @ (u_control + self._u_trim))
+        if not math.isfinite(sum(tau_b.tolist())):
+            raise RunError("the wrench is not finite; start from other weights")
+        self._gate.keep(seen)
+        self.zeta, self._J = seen.zeta, J
+        last = self.learned.last_step
+        rolled_back = last is not None and last.rolled_back
+        if seen.flags or rolled_back or self.flags:
+            self.flags = (*seen.flags, *(("rollback",) if rolled_back else ()))
+            self.counts.update(self.flags)
+            tell(self.counts, seen.flags)
+        return tau_b
 
     def body_wrench(self, u: Array) -> Array:
         """Return τ = J(η)'u of an earth-frame force u at the last state, shape (6,)."""
@@ -152,4 +180,15 @@ class Controller:
         """
         zeta: Array = self._turn @ (measured - self._origin)
         zeta[5] = math.atan2(math.sin(zeta[5]), math.cos(zeta[5]))  # with the rounding of all records
-        return self._angles.enter(zeta)
+        return zeta
+
+
+def _station(station: Sequence[float]) -> Array:
+    """Return the station (4,); raises InputError unless it is four finite numbers."""
+    try:
+        given = np.array(station, dtype=float)
+    except (TypeError, ValueError):
+        given = np.zeros(0)
+    if given.shape != (4,) or not np.isfinite(given).all():
+        raise InputError(f"the station is {station}, but must be four finite numbers x, y, z, psi")
+    return given

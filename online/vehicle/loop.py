@@ -15,6 +15,7 @@ from .allocation import Allocator
 from .controller import Controller, ControllerScenario
 from .disturbance import DisturbanceSource, build_disturbance
 from .history import VehicleHistory
+from .measurement import Limits
 from .noise import MeasurementNoise
 from .observer import DisturbanceObserver
 from .plant import HeldPlant
@@ -91,8 +92,7 @@ class VehicleSystem(System[VehiclePolicy]):
         limited = settings.thruster_limits
         self.thrusters = Allocator(vehicle or station.model.vehicle) if limited else None
         self.noise = MeasurementNoise(settings.noise)
-        bandwidth = settings.observer_bandwidth
-        self.observer = DisturbanceObserver(station, bandwidth) if bandwidth else None
+        self.observer = _observer(station, settings)
         self.state = PlantState(scenario.initial_state, 0.0, 0.0)
 
     def command(self, policy: VehiclePolicy, period: float) -> Array:
@@ -138,3 +138,11 @@ class VehicleSystem(System[VehiclePolicy]):
         """Return how the pitch is beyond its limit, or None."""
         pitch, limit = math.degrees(zeta[4]), self.settings.pitch_limit
         return f"the pitch left ±{limit:g} deg ({pitch:.1f} deg)" if abs(pitch) > limit else None
+
+
+def _observer(station: StationKeeping, settings: SimulationSettings) -> DisturbanceObserver | None:
+    bandwidth = settings.observer_bandwidth
+    if not bandwidth:
+        return None
+    limits = Limits.of(station, settings.chi, settings.pitch_limit)
+    return DisturbanceObserver(station, bandwidth, limits=limits)

@@ -22,11 +22,20 @@ from __future__ import annotations
 
 import numpy as np
 from casadi import SX
+from numpy.typing import ArrayLike
 
 from ...symbolic import InputError, Kernel, StationKeeping
 from ...symbolic.arrays import Array
 from ...symbolic.compiled import dense_function
 from ...symbolic.underwater import inverse_dynamics, jacobian_inverse
+from .measurement import (
+    Flags,
+    Limits,
+    MeasurementGate,
+    require_dt,
+    require_state,
+    require_wrench,
+)
 
 
 class DisturbanceObserver:
@@ -37,9 +46,12 @@ class DisturbanceObserver:
     station : the vehicle's model
     bandwidth : ω_o [1/s]; well below the frequency of the waves, which it would follow too late
 
+    limits : where measurements are flagged; those of vehicle and game if None
+
     Attributes
     ----------
     estimate : (6,) d_hat in the frame of ζ [N, N m]
+    flags : why the last step learned nothing of its measurement, as a controller's; else empty
 
     Raises
     ------
@@ -54,32 +66,60 @@ class DisturbanceObserver:
     >>> observer.applied(tau_b)
     """
 
-    def __init__(self, station: StationKeeping, bandwidth: float) -> None:
+    def __init__(
+        self, station: StationKeeping, bandwidth: float, *, limits: Limits | None = None
+    ) -> None:
         if not (bandwidth > 0.0 and np.isfinite(bandwidth)):
             raise InputError(f"the observer's bandwidth is {bandwidth}, but must be positive, in 1/s")
         self.bandwidth = bandwidth
         self.estimate = np.zeros(6)
+        self.flags: Flags = ()
+        self._gate = MeasurementGate(station, limits or Limits.of(station))
         self._missing = _missing_force(station)
         self._zeta: Array | None = None
         self._tau_b: Array | None = None
 
-    def step(self, zeta: Array, dt: float) -> Array:
-        """Return d_hat at ζ (12,), dt [s] after the last step, the applied wrench held meanwhile."""
-        if self._zeta is not None and self._tau_b is not None:
-            acceleration = (zeta[6:] - self._zeta[6:]) / dt
-            ends = [self._missing(end, acceleration, self._tau_b)[0] for end in (self._zeta, zeta)]
-            gap = 0.5 * (ends[0] + ends[1]) - self.estimate
-            self.estimate = self.estimate - np.expm1(-self.bandwidth * dt) * gap
-        self._zeta, self._tau_b = zeta, None
-        return self.estimate
+    def step(self, zeta: ArrayLike, dt: float) -> Array:
+        """Return d_hat at ζ (12,), dt [s] after the last step, the applied wrench held meanwhile.
 
-    def applied(self, tau_b: Array) -> None:
+        Flags as a controller does (`Controller`): a gap, a jump or a rate says nothing of the
+        acceleration, and d_hat stays. So it does where it would not be finite.
+
+        Raises
+        ------
+        InputError
+            If ζ is not 12 finite numbers of a size that can be measured, dt is no positive time, or the
+            pitch is beyond its limit; nothing changes.
+        """
+        state, dt = require_state(zeta), require_dt(dt)
+        seen = self._gate.look(state, dt)
+        last, tau_b = self._zeta, self._tau_b
+        if last is not None and tau_b is not None and not set(seen.flags) - {"far"}:
+            self.estimate = self._estimated(last, state, tau_b, dt)
+        self._gate.keep(seen)
+        self._zeta, self._tau_b, self.flags = state, None, seen.flags
+        return self.estimate.copy()
+
+    def _estimated(self, last: Array, zeta: Array, tau_b: Array, dt: float) -> Array:
+        with np.errstate(over="ignore", invalid="ignore"):  # of a tiny dt
+            acceleration = (zeta[6:] - last[6:]) / dt
+            ends = [self._missing(end, acceleration, tau_b)[0] for end in (last, zeta)]
+            gap = 0.5 * (ends[0] + ends[1]) - self.estimate
+            estimate = self.estimate - np.expm1(-self.bandwidth * dt) * gap
+        return np.asarray(estimate) if np.isfinite(estimate).all() else self.estimate
+
+    def applied(self, tau_b: ArrayLike) -> None:
         """Tell which wrench (6,) the vehicle gets until the next step [N, N m].
 
         Within the thrusters' limits: what they do not give would count as a disturbance, and be asked
         for once more. A step that was told none learns nothing.
+
+        Raises
+        ------
+        InputError
+            If it is not six finite numbers; the one that was told before stays.
         """
-        self._tau_b = tau_b
+        self._tau_b = require_wrench(tau_b)
 
 
 def _missing_force(station: StationKeeping) -> Kernel:

@@ -1,12 +1,14 @@
 """Calls without copies: a CasADi function bound once to numpy arrays that live as long as it.
 
 CasADi reads and writes column-major nonzeros, so every argument and result is dense and its array is
-a Fortran-ordered view of one flat buffer.
+a Fortran-ordered view of one flat buffer. Every thread has arrays of its own.
 """
 
 from __future__ import annotations
 
 import logging
+import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -23,18 +25,24 @@ TOLERANCE = 1e-12  # largest norm-relative difference of compiled to symbolic
 WITHOUT_COMPILER = "using CasADi's virtual machine and numpy, 5 to 10 times slower"
 
 
-class Kernel:
-    """One function behind fixed buffers.
+class Kernel(threading.local):
+    """One function behind fixed buffers, which are each thread's own.
 
     Write to `inputs`, call `evaluate()`, read `outputs`; or call the kernel with arrays, which copies
-    them in and the results out. Not for two threads at once.
+    them in and the results out. A thread that meets the kernel first is given buffers (`__init__` runs
+    once more in it, as for every `threading.local`), so that threads never see each other's numbers.
+
+    Parameters
+    ----------
+    function : that is evaluated; its results are dense
+    constants : values of its last inputs, written once
 
     Attributes
     ----------
     inputs, outputs : arrays of the function's shapes; vectors are one-dimensional
     """
 
-    def __init__(self, function: casadi.Function) -> None:
+    def __init__(self, function: casadi.Function, constants: Sequence[Array] = ()) -> None:
         self.function = function
         buffer, self.evaluate = function.buffer()
         self.inputs = tuple(_array(function.size_in(i)) for i in range(function.n_in()))
@@ -44,6 +52,8 @@ class Kernel:
         for i, array in enumerate(self.outputs):
             buffer.set_res(i, array.ravel(order="K").data)  # type: ignore[call-arg]
         self._buffer = buffer
+        for array, value in zip(reversed(self.inputs), reversed(constants), strict=False):
+            array[...] = value
 
     def __call__(self, *arguments: ArrayLike) -> tuple[Array, ...]:
         """Return copies of all results for the given arguments."""
@@ -78,10 +88,15 @@ class Export:
 
 
 def export(
-    function: casadi.Function, *, compiled: bool = True, operations: int | None = None
+    function: casadi.Function,
+    *,
+    compiled: bool = True,
+    operations: int | None = None,
+    constants: Sequence[Array] = (),
 ) -> tuple[Kernel, Export]:
     """Compile a function, compare it with its symbolic source and bind it to buffers.
 
+    The last inputs hold `constants` from then on.
     A mapped function, which can't count its `operations`, is told them, and compared for one set of
     arguments (its many points); others are counted and compared for 20.
     Without a usable compiler or cache the virtual machine takes its place, and a message says so once.
@@ -116,7 +131,7 @@ def export(
         max_difference=difference,
         key=key,
     )
-    return kernel, described
+    return Kernel(kernel.function, constants) if constants else kernel, described
 
 
 def max_difference(first: Kernel, second: Kernel, n_points: int = 20, seed: int = 0) -> float:

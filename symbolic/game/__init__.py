@@ -2,11 +2,19 @@
 
 from .angles import Angles, AngleTracker, Equivalence
 from .checks import InverseDynamics
-from .domain import Bound, margins_and_shown, outside, require_numbers
+from .domain import Bound, margins_and_shown, outside, require_numbers, require_time_step
 from .game import Game, gamma_threshold, weight_matrix
 from .problem import Problem
 from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_solution
-from .sampled import MEAN_FROM, HeldLoop, fastest_mode, held_loop, longest_period, mean_matrix
+from .sampled import (
+    MEAN_FROM,
+    HeldLoop,
+    fastest_mode,
+    held_loop,
+    longest_hold,
+    longest_period,
+    mean_matrix,
+)
 from .stored import problem_from_data, problem_to_data
 
 __all__ = [
@@ -25,6 +33,7 @@ __all__ = [
     "gamma_star",
     "gamma_threshold",
     "held_loop",
+    "longest_hold",
     "longest_period",
     "margins_and_shown",
     "mean_matrix",
@@ -32,6 +41,7 @@ __all__ = [
     "problem_from_data",
     "problem_to_data",
     "require_numbers",
+    "require_time_step",
     "stabilising_solution",
     "weight_matrix",
 ]

@@ -148,14 +148,37 @@ class AngleTracker:
     def __init__(self, angles: Angles) -> None:
         self._angles = angles
         self._last: Array | None = None
+        self._halves = [(i, 0.5 * period) for i, period in enumerate(angles.periods) if period]
+        if angles.equivalence is not None:
+            self._halves.append((angles.equivalence.state, angles.equivalence.limit))
 
     def enter(self, zeta: Array) -> Array:
         """Return the measured state (n,) as it continues the one before."""
-        angles, entered = self._angles, self._angles.wrapped(zeta)
-        if self._last is not None:
-            entered = angles.reentered(angles.beside(entered, self._last))
-        self._last = entered
+        entered = self.seen(zeta)
+        self.keep(entered)
         return entered
+
+    def seen(self, zeta: Array, *, anew: bool = False) -> Array:
+        """Return what `enter` would, and keep nothing; `anew`: as the first measurement."""
+        last = None if anew else self._last
+        if self._is_plain(zeta, zeta if last is None else last):
+            return zeta
+        angles, entered = self._angles, self._angles.wrapped(zeta)
+        if last is not None:
+            entered = angles.reentered(angles.beside(entered, last))
+        return entered
+
+    def keep(self, entered: Array) -> None:
+        """Keep what was seen, for the next measurement to continue it."""
+        self._last = entered
+
+    def _is_plain(self, zeta: Array, last: Array) -> bool:
+        """Return whether no angle is farther than half a period from zero, nor from the last."""
+        for i, half in self._halves:
+            angle = zeta[i]
+            if not -half <= angle <= half or not -half <= angle - last[i] <= half:
+                return False
+        return True
 
     def forget(self) -> None:
         """Take the next measurement as the first: what it is measured from has moved."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -69,3 +71,21 @@ def require_numbers(zeta: ArrayLike, names: Sequence[str]) -> Array:
     if not np.isfinite(state).all():
         raise InputError("a state must be finite, but it contains NaN or infinity")
     return state
+
+
+def require_time_step(dt: object) -> float:
+    """Return a time step [s] as a float.
+
+    Raises
+    ------
+    InputError
+        Unless it is a positive finite number.
+    """
+    if isinstance(dt, np.ndarray) and dt.shape == ():
+        dt = dt[()]
+    if not isinstance(dt, numbers.Real) or isinstance(dt, (bool, np.bool_)):
+        raise InputError(f"dt is a {type(dt).__name__}, but must be a positive time in seconds")
+    step = float(dt)
+    if not 0.0 < step < math.inf:
+        raise InputError(f"dt is {step:g}, but must be a positive time in seconds")
+    return step

@@ -83,6 +83,20 @@ def longest_period(problem: Problem, most: float) -> float:
     return float(np.floor(low / 10.0**exponent) * 10.0**exponent)
 
 
+def longest_hold(problem: Problem, most: float) -> float:
+    """Return how long a control may be held until the linearised loop gets unstable, up to `most` [s].
+
+    Where its modes over one period reach the unit circle; `longest_period` keeps a margin from there.
+    """
+    if held_radius(problem, most) < 1.0:
+        return most
+    low, high = 0.0, most
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if held_radius(problem, middle) < 1.0 else (low, middle)
+    return low
+
+
 def fastest_mode(problem: Problem) -> tuple[float, str]:
     """Return |λ| of the fastest mode of the closed loop [1/s], and the state that it moves most.
 

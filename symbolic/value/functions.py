@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -133,6 +133,10 @@ class ValueFunctions:
         self.sampler(n_samples)
         yield self._exports["sample_kernel"]
 
+    def exported(self, name: str) -> Export:
+        """Return what became of a function that is built."""
+        return self._exports[name]
+
     def _gradient(self, weights: SX) -> SX:
         sigma, zeta = self.basis.sigma, self.problem.zeta
         return casadi.gradient(casadi.dot(weights, sigma), zeta)
@@ -146,8 +150,12 @@ class ValueFunctions:
         }
         return dense_function("point", {"zeta": zeta}, outputs)
 
-    def _export_mapped(self, function: casadi.Function, operations: int) -> Kernel:
-        kernel, described = export(function, compiled=self.compiled, operations=operations)
+    def _export_mapped(
+        self, function: casadi.Function, operations: int, constants: Sequence[Array] = ()
+    ) -> Kernel:
+        kernel, described = export(
+            function, compiled=self.compiled, operations=operations, constants=constants
+        )
         self._exports[function.name()] = described
         return kernel
 

@@ -13,7 +13,7 @@ gradient of the Bellman equation r + V_ζ F = 0 along the path, so λ is what V_
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,7 +28,7 @@ from .basis import Basis
 from .stepping import Stepping
 
 BOUND = 4.0  # half-widths; a path that gets farther, or out of the domain, counts as lost
-Exporter = Callable[[casadi.Function, int], Kernel]
+Exporter = Callable[[casadi.Function, int, Sequence[Array]], Kernel]
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Prediction:
     ----------
     problem, basis : of the policies
     stepping : the steps over the horizon, and their method
-    exporter : makes a kernel of a function and its number of operations
+    exporter : makes a kernel of a function, its number of operations and its last inputs' values
     """
 
     def __init__(self, problem: Problem, basis: Basis, stepping: Stepping, exporter: Exporter) -> None:
@@ -78,6 +78,25 @@ class Prediction:
     def steps(self) -> Array:
         """The steps over the horizon, (N,) [s]."""
         return self.stepping.steps
+
+    def build(self, n_points: Sequence[int]) -> Iterator[str]:
+        """Build what a path and its cost need, and yield the names of the functions.
+
+        Parameters
+        ----------
+        n_points : numbers of points for which rows will be asked; costates and rows only if any
+        """
+        self._path_kernel  # noqa: B018 - built when first asked for
+        yield "predicted_path"
+        if self.problem.same_inputs:
+            self._linear_kernel  # noqa: B018
+            yield "predicted_linear_path"
+        if n_points:
+            self._costate_kernel  # noqa: B018
+            yield "predicted_costates"
+            for number in n_points:
+                self._row_kernel(number)
+            yield "costate_rows"
 
     def path(self, zeta: Array, actor_1: Array, actor_2: Array) -> PredictedPath:
         """Return the path from ζ (n,) under Ŵ_a1, Ŵ_a2 (m,)."""
@@ -101,9 +120,7 @@ class Prediction:
         the value with the gradient λ.
         """
         n_points, k, m = len(points), self.problem.n_inputs, self.basis.n_basis
-        if n_points not in self._row_kernels:
-            self._row_kernels[n_points] = self._rows_of(n_points)
-        kernel = self._row_kernels[n_points]
+        kernel = self._row_kernel(n_points)
         kernel.inputs[0].T[...] = points
         kernel.inputs[1].T[...] = costates
         kernel.evaluate()
@@ -191,11 +208,7 @@ class Prediction:
         symbols = [*inputs, *parameters]
         names = [symbol.name() for symbol in symbols]
         function = casadi.Function(name, symbols, [*outputs.values()], names, [*outputs])
-        kernel = self._exporter(function, operations)
-        values = self.stepping.parameters.values()
-        for array, value in zip(kernel.inputs[len(inputs) :], values, strict=True):
-            array[...] = value
-        return kernel
+        return self._exporter(function, operations, [*self.stepping.parameters.values()])
 
     @cached_property
     def _path_kernel(self) -> Kernel:
@@ -241,6 +254,11 @@ class Prediction:
     def _operations(self, rates: casadi.Function) -> int:
         return int(4 * len(self.steps) * rates.n_instructions())
 
+    def _row_kernel(self, n_points: int) -> Kernel:
+        if n_points not in self._row_kernels:
+            self._row_kernels[n_points] = self._rows_of(n_points)
+        return self._row_kernels[n_points]
+
     def _rows_of(self, n_points: int) -> Kernel:
         problem, n = self.problem, self.problem.n_states
         costate = SX.sym("costate", n)
@@ -258,7 +276,7 @@ class Prediction:
         )
         names = ["points", "costates"], ["regressors", "targets", "sigmas"]
         function = casadi.Function("costate_rows", [points, costates], [*mapped], *names)
-        return self._exporter(function, point.n_instructions() * n_points)
+        return self._exporter(function, point.n_instructions() * n_points, ())
 
 
 def _called(kernel: Kernel, *arguments: Array) -> tuple[Array, ...]:
