@@ -14,6 +14,7 @@ from ...symbolic import InputError, RunError, StationKeeping
 from ...symbolic.arrays import Array
 from ..learning import Learner, LearnerStep
 from ..loop import LearnedPolicy, LearnerScenario
+from .allocation import require_trim
 from .measurement import Flags, Limits, MeasurementGate, require_dt, require_measurement, tell
 from .settings import SimulationSettings
 
@@ -87,6 +88,7 @@ class Controller:
     ) -> None:
         self.station = _station(station)
         self.setup = scenario.station_keeping()
+        require_trim(self.setup)
         c, s = np.cos(self.station[3]), np.sin(self.station[3])
         self._turn = np.eye(12)
         self._turn[:2, :2] = self._turn[6:8, 6:8] = [[c, s], [-s, c]]
@@ -191,4 +193,8 @@ def _station(station: Sequence[float]) -> Array:
         given = np.zeros(0)
     if given.shape != (4,) or not np.isfinite(given).all():
         raise InputError(f"the station is {station}, but must be four finite numbers x, y, z, psi")
+    if abs(given[3]) > 2.0 * math.pi:
+        raise InputError(
+            f"the station's heading is {given[3]:g} rad, more than a whole turn; angles are in rad"
+        )
     return given
