@@ -18,6 +18,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import argparse
 import contextlib
 import io
+import json
 import sys
 import tempfile
 import time
@@ -30,6 +31,8 @@ from pathlib import Path
 
 import numpy as np
 from stationkeep.cli.main import main as command
+from stationkeep.comparison import Scenario
+from stationkeep.symbolic import InputError
 from studies.changed_inputs import Inputs
 
 TOO_LONG = 20.0  # s of processor time
@@ -55,14 +58,30 @@ class Found:
 
 
 def answer(words: list[str]) -> tuple[int, str]:
-    """Return exit code and standard error of a command."""
+    """Return exit code and standard error of a command; a failure may be told in its JSON instead."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
-            code = command(words)
+            code = loaded(words[1:]) if words[0] == "load" else command(words)
         except SystemExit as end:
             code = int(end.code or 0)
-    return code, err.getvalue()
+    said = err.getvalue()
+    if code == 1 and not said and isinstance(json.loads(out.getvalue()), dict):
+        said = "stationkeep: told in the JSON\n"
+    return code, said
+
+
+def loaded(words: list[str]) -> int:
+    """Load a scenario with settings and set its problem up, as every command does."""
+    pairs = [*zip(words, ["", *words], strict=False)]
+    names = [word for word, before in pairs if "--set" not in (word, before)]
+    sets = [word for word, before in pairs if before == "--set"]
+    try:
+        Scenario.load(names[0] if names else "bluerov2-heavy", sets).setup()
+    except InputError as error:
+        print(f"stationkeep: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 def fault_of(code: int, said: str) -> str | None:

@@ -110,6 +110,6 @@ def _cells(text: str) -> list[str]:
 
 def _number(cell: str, where: str) -> float:
     try:
-        return float(cell)
+        return float(cell.replace("_", "?"))  # which Python takes for nothing
     except ValueError:
         raise InputError(f"{where} is '{cell[:40]}', but must be a number; correct it") from None

@@ -62,10 +62,10 @@ STATES: list[tuple[str, Callable[[Path], None], list[str]]] = [
     ("ragged.csv", write_text("1,2,3\n4,5\n"), ["12"]),
     ("empty.csv", write_text(""), ["rows of 12"]),
     ("header.csv", write_text("x,y,z\n" + ROW), ["rows of 12"]),
-    ("spaces.csv", write_text(ROW.replace(",", " ")), ["rows of 12"]),
+    ("spaces.csv", write_text(ROW.replace(",", " ", 3)), ["line 1", "rows of 12"]),
     ("cut.csv", write_text(ROW + ROW[:-6]), ["12"]),
     ("nan.csv", write_text(ROW + NAN_ROW), ["finite"]),
-    ("noise.csv", write_bytes(bytes(range(128, 256))), ["rows of 12"]),
+    ("noise.csv", write_bytes(bytes(range(128, 256))), ["UTF-8", "states"]),
 ]
 
 

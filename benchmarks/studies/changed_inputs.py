@@ -20,12 +20,13 @@ VALUES: tuple[Any, ...] = (
 )
 FACTORS = (-1.0, 0.0, 1e-3, 1e3, 1e6, 0.5, 2.0, 9.81, 1.0 / 9.81)
 SHORT = (
-    "--set",
-    "simulation.duration=0.1",
-    "--set",
-    "samples.number=10",
-    "--set",
-    "basis.name=quadratic",
+    *("--set", "simulation.duration=0.1", "--set", "samples.number=10"),
+    *("--set", "basis.name=quadratic"),
+)
+WORDS = ("", "nan", "inf", "1e999", "x", "--", "0x10", "1_0", "3.2", "1,5", "#")
+TEXTS = (
+    *("", "=", "a=", "=1", "game", "game.=1", ".gamma=1", "game.gamma", "game[0]=1", "a.b.c.d=1"),
+    *("game.Q[99]=1", "game.Q[-1]=1", "simulation=3", "game.gamma=1=2", "vehicle=[1]", "\n"),
 )
 QUIET = ("--quiet", "--json")
 
@@ -65,20 +66,19 @@ class Inputs:
         name, text = self._changed(self._vehicle)
         path = self.folder / "vehicle.toml"
         path.write_bytes(text)
-        words = ["check", "--set", f"vehicle={path}", *SHORT, *QUIET]
-        return name, self._shorter(words)
+        return name, [*self._command(), "--set", f"vehicle={path}", *SHORT]
 
     def scenario(self) -> tuple[str, list[str]]:
         """A scenario's file."""
         name, text = self._changed(self._scenario)
         path = self.folder / "scenario.toml"
         path.write_bytes(text)
-        return name, self._shorter([*self._command(), str(path), *SHORT, *QUIET])
+        return name, [*self._command(), str(path), *SHORT]
 
     def override(self) -> tuple[str, list[str]]:
         """One or two `--set`."""
         texts = [self._set() for _ in range(int(self.rng.integers(1, 3)))]
-        words = [*self._command(), *SHORT, *QUIET]
+        words = [*self._command(), *SHORT]
         for text in texts:
             words += ["--set", text]
         return " ".join(texts)[:300], words
@@ -126,11 +126,10 @@ class Inputs:
         return f"{words[0]}, byte {place}, bit {bit}", words
 
     def _command(self) -> list[str]:
-        out = ["--out", str(self.folder / "out")]
-        return (["check"], ["online", *out], ["check"])[int(self.rng.integers(3))]
-
-    def _shorter(self, words: list[str]) -> list[str]:
-        return words
+        """Return what takes the input: mostly what all commands begin with, at times a whole one."""
+        whole = ["check", *QUIET], ["online", *QUIET, "--out", str(self.folder / "out")]
+        kind = int(self.rng.integers(12))
+        return whole[kind] if kind < len(whole) else ["load"]
 
     def _solve(self, words: list[str]) -> list[str]:
         rough = ("horizon=5", "intervals=4", "aligned=false", "starts=0", "rounds=1", "max_seconds=3")
@@ -140,35 +139,11 @@ class Inputs:
         return words
 
     def _word(self, number: float) -> str:
-        if self.rng.random() > 0.03:
-            return f"{number:.4g}"
-        return str(
-            self.rng.choice(["", "nan", "inf", "1e999", "x", "--", "0x10", "1_0", "3.2", "1,5", "#"])
-        )
+        return f"{number:.4g}" if self.rng.random() > 0.03 else str(self.rng.choice(WORDS))
 
     def _set(self) -> str:
         if self.rng.random() < 0.1:
-            texts = [
-                "",
-                "=",
-                "a=",
-                "=1",
-                "game",
-                "game.=1",
-                ".gamma=1",
-                "game.gamma",
-                "game[0]=1",
-                "a.b.c.d=1",
-            ]
-            texts += [
-                "game.Q[99]=1",
-                "game.Q[-1]=1",
-                "simulation=3",
-                "game.gamma=1=2",
-                "vehicle=[1]",
-                "\n",
-            ]
-            return str(self.rng.choice(texts))
+            return str(self.rng.choice(TEXTS))
         key = self._keys[int(self.rng.integers(len(self._keys)))]
         return f"{key}={to_toml(self._value())}"
 
