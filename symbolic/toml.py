@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import PydanticKnownError
@@ -22,8 +22,9 @@ class Settings(BaseModel):
     @classmethod
     def _no_words_for_numbers(cls, value: Any, info: ValidationInfo) -> Any:
         """Refuse a text or a truth value where a number belongs: pydantic would make one of it."""
-        kinds = _kinds(cls.model_fields[str(info.field_name)].annotation)
-        numbers = kinds & {int, float}
+        annotation = cls.model_fields[str(info.field_name)].annotation
+        kinds = _kinds(annotation)
+        numbers = kinds & {int, float} if _fits(annotation, value) else set()
         if numbers and any(kind not in kinds and _holds(value, kind) for kind in (str, bool)):
             if numbers == {int}:
                 raise PydanticKnownError("int_type")
@@ -42,6 +43,15 @@ def _kinds(annotation: Any) -> set[Any]:
     if not parts:
         return {annotation if isinstance(annotation, type) else type(annotation)}
     return set().union(*(_kinds(part) for part in parts))
+
+
+def _fits(annotation: Any, value: Any) -> bool:
+    """Whether a number may stand alone where a single value is given; an array is looked into."""
+    if isinstance(value, (list, tuple)) or annotation in (int, float):
+        return True
+    if isinstance(annotation, type) or get_origin(annotation) in (tuple, list, dict):
+        return False
+    return any(_fits(part, value) for part in get_args(annotation) if part is not type(None))
 
 
 def _holds(value: Any, kind: type) -> bool:

@@ -55,9 +55,12 @@ class HeldLoop:
 
 def held_loop(problem: Problem, period: float) -> HeldLoop:
     """Return the loop under the linear policies, held for `period` [s]."""
-    radius = held_radius(problem, period)
-    bound = float(np.exp(-MARGIN * problem.decay_rate * period))
-    return HeldLoop(radius, bound, _gain_margin(problem, period))
+    margin = _gain_margin(problem, period)
+    return HeldLoop(held_radius(problem, period), _bound(problem, period), margin)
+
+
+def _bound(problem: Problem, period: float) -> float:
+    return float(np.exp(-MARGIN * problem.decay_rate * period))
 
 
 def held_radius(problem: Problem, period: float, factor: float = 1.0) -> float:
@@ -78,7 +81,8 @@ def longest_period(problem: Problem, most: float) -> float:
     low, high = 0.0, most
     for _ in range(40):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if held_loop(problem, middle).holds else (low, middle)
+        holds = held_radius(problem, middle) <= _bound(problem, middle)
+        low, high = (middle, high) if holds else (low, middle)
     exponent = np.floor(np.log10(low)) - 1.0 if low > 0.0 else 0.0
     return float(np.floor(low / 10.0**exponent) * 10.0**exponent)
 
