@@ -14,6 +14,7 @@ from pathlib import Path
 import casadi
 import pytest
 from stationkeep.comparison.sweep.sweep_table import Journal
+from stationkeep.online.records import writable_folder
 from stationkeep.symbolic import InputError
 from stationkeep.symbolic.compiled.compilation import (
     CompilationError,
@@ -164,3 +165,19 @@ def test_what_is_no_journal_stays_as_it_is(tmp_path: Path, how: str, one_sentenc
         Journal(path)
     assert str(path) in one_sentence(caught.value)
     assert precious.read_bytes() == b"first line\nno newline at its end"
+
+
+def test_what_killed_runs_left_in_a_folder_goes(tmp_path: Path) -> None:
+    """Of processes that are no more; what is being written, or is a user's own, stays."""
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    (tmp_path / "figures").mkdir()
+    left = [tmp_path / f".report.html-{dead.pid}-0123abcd"]
+    left.append(tmp_path / "figures" / f".regret.pdf-{dead.pid}-89abcdef")
+    stays = [tmp_path / f".report.html-{os.getpid()}-0123abcd", tmp_path / ".own-notes-2026"]
+    stays.append(tmp_path / "report.html")
+    for path in (*left, *stays):
+        path.touch()
+    assert writable_folder(tmp_path) == tmp_path
+    assert not any(path.exists() for path in left)
+    assert all(path.exists() for path in stays)

@@ -18,6 +18,8 @@ from ...symbolic import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
+_TEMPORARY = re.compile(r"-(\d+)-[0-9a-f]{8}$")  # what `written_whole` writes to: process and chance
+
 
 def versions() -> dict[str, str]:
     """Return the versions that numbers depend on."""
@@ -51,6 +53,7 @@ def writable_folder(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
+            remove_abandoned(folder)
             return folder
     except OSError as error:
         raise InputError(
@@ -85,9 +88,30 @@ def written_whole(path: Path) -> Iterator[Path]:
 def remove_temporaries(folder: Path, pattern: str) -> None:
     """Remove what killed runs left of files like `pattern`; nobody may be writing one."""
     for path in folder.glob(f".{pattern}-*-*"):
-        if re.search(r"-\d+-[0-9a-f]{8}$", path.name):
+        if _TEMPORARY.search(path.name):
             with contextlib.suppress(OSError):
                 path.unlink()
+
+
+def remove_abandoned(folder: Path) -> None:
+    """Remove what runs of this machine that are no more left in a folder, and in those in it."""
+    if os.name == "nt":  # where asking for a process may end it
+        return
+    for path in (*folder.glob(".*-*-*"), *folder.glob("*/.*-*-*")):
+        match = _TEMPORARY.search(path.name)
+        if match is not None and not _is_alive(int(match[1])):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        pass
+    return True
 
 
 def write_text(path: Path, text: str) -> Path:

@@ -135,6 +135,7 @@ def compile_source(source: str, flags: tuple[str, ...]) -> Library:
             "STATIONKEEP_CACHE to a folder of your own"
         )
     entry = folder / key
+    _tidy(folder)
     if _is_whole(entry):
         return Library(entry / "function.so", key, cache_hit=True)
     try:
@@ -219,6 +220,12 @@ def _publish(folder: Path, entry: Path) -> None:
                 entry.rename(broken)
             _remove(broken)
     raise CompilationError(f"the cache entry '{entry}' is broken and can't be replaced; delete it")
+
+
+@cache
+def _tidy(folder: Path) -> None:
+    """Remove what killed builds left, once a process."""
+    _remove_stale(folder)
 
 
 def _remove_stale(folder: Path) -> None:
