@@ -45,3 +45,16 @@ def test_scripts_that_documents_name_exist() -> None:
     for page in (ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.md")):
         for name in re.findall(r"benchmarks/[\w/]+\.py", page.read_text(encoding="utf-8")):
             assert (ROOT / name).is_file(), f"{page.name}: {name}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("script", "options"),
+    [("fuzz.py", ["--inputs", "100", "--flips", "25"]), ("kills.py", ["--kills", "4"])],
+)
+def test_wrong_inputs_and_kills(script: str, options: list[str], tmp_path: Path) -> None:
+    """A seeded part of what the scripts do by the thousand and the hundred."""
+    command = [sys.executable, str(FOLDER / script), *options]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=900)
+    assert done.returncode == 0, done.stdout
+    assert " 0 faults" in done.stdout
