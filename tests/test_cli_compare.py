@@ -104,6 +104,7 @@ def small(folder: Path) -> Answer:
     return run(*words, *SMALL, cwd=folder)
 
 
+@pytest.mark.slow
 def test_small_compare(small: Answer, folder: Path) -> None:
     assert small.code == 0
     assert small.err == ""
@@ -121,6 +122,7 @@ def test_small_compare(small: Answer, folder: Path) -> None:
         assert (results / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.slow
 def test_small_report(small: Answer, folder: Path) -> None:
     answer = small.json()
     page = assert_self_contained(folder / answer["report"], answer["figures"], folder)
@@ -131,6 +133,7 @@ def test_small_report(small: Answer, folder: Path) -> None:
         assert override in command, "the report says how to do it again"
 
 
+@pytest.mark.slow
 def test_a_run_too_short_for_a_regret_says_so(small: Answer) -> None:
     """After 2 s most of the cost is an estimate, ζ'P ζ: nothing can cost less than the optimum."""
     answer = small.json()
@@ -139,6 +142,7 @@ def test_a_run_too_short_for_a_regret_says_so(small: Answer) -> None:
         assert median is None or median > -1e-6 or name in str(answer.get("notes")), (name, median)
 
 
+@pytest.mark.slow
 def test_all_policies_start_alike(small: Answer, folder: Path) -> None:
     assert small.code == 0
     records = folder / "results" / "bluerov2-heavy" / "records"

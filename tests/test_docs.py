@@ -57,11 +57,22 @@ def runs(text: str, folder: Path, seconds: float) -> None:
     assert done.returncode == 0, done.stderr
 
 
+QUICK = ("README", "problem")  # pages whose blocks run every time
+
+
 def is_slow(page: Path) -> bool:
     return any(block.mark == "slow" for block in read(page))
 
 
-@pytest.mark.parametrize("page", [p for p in [README, *PAGES] if read(p)], ids=name_of)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=[] if page.stem in QUICK else [pytest.mark.slow])
+        for page in [README, *PAGES]
+        if read(page)
+    ],
+    ids=name_of,
+)
 def test_blocks_run(page: Path, tmp_path: Path) -> None:
     runs(program(read(page), slow=False), tmp_path, 240)
 

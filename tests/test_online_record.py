@@ -138,8 +138,7 @@ def test_truncated_files_are_refused(dataset: xr.Dataset, tmp_path: Path, one_se
         one_sentence(caught.value)
 
 
-# h5netcdf itself complains while it drops a file that it could not open to the end
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.slow
 def test_damaged_files_are_refused_or_read(dataset: xr.Dataset, tmp_path: Path) -> None:
     """A flipped byte may go unnoticed in the data, but never ends in another kind of error."""
     whole = bytearray(save(dataset, tmp_path / "run.nc").read_bytes())

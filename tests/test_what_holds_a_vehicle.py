@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from stationkeep import Controller, Scenario, check, sweep
 from stationkeep.comparison.records import closed_loop
+from stationkeep.comparison.theory.vehicle_conditions import trim_condition
 from stationkeep.symbolic import InputError, Vehicle
 
 Check = Callable[[BaseException], str]
@@ -26,7 +27,7 @@ def test_a_trim_beyond_the_thrusters(
     override: str, share: float, words: list[str], one_sentence: Check
 ) -> None:
     scenario = Scenario.load(overrides=[override, "samples.number=20"])
-    (row,) = (one for one in check(scenario) if one.name == "the thrusters can hold the trim")
+    (row,) = trim_condition(scenario.station_keeping())
     assert row.value == pytest.approx(share, rel=0.01)
     assert not row.holds
     for use in (closed_loop, Controller):
@@ -34,6 +35,11 @@ def test_a_trim_beyond_the_thrusters(
             use(scenario)
         text = one_sentence(caught.value)
         assert all(word in text for word in words), text
+
+
+def test_check_has_a_row_of_the_trim() -> None:
+    names = {row.name: row for row in check(Scenario.load(overrides=["basis.name=quadratic"]))}
+    assert names["the thrusters can hold the trim"].value == 0.0
 
 
 def test_a_setting_of_a_sweep_that_cannot_be_held_is_a_row(tmp_path: Path) -> None:

@@ -70,8 +70,8 @@ def run(
     """
     if source is None:
         source = build_disturbance(scenario.simulation.disturbance)
-    policy = Controller(scenario) if policy is None else policy
     system = VehicleSystem(scenario, source)
+    policy = Controller(scenario) if policy is None else policy
     drive(system, policy, scenario, progress)
     return system.history
 
