@@ -31,6 +31,7 @@ from pathlib import Path
 
 import numpy as np
 from stationkeep.cli.main import main as command
+from stationkeep.cli.states import initial_states
 from stationkeep.comparison import Scenario
 from stationkeep.symbolic import InputError
 from studies.changed_inputs import Inputs
@@ -62,13 +63,29 @@ def answer(words: list[str]) -> tuple[int, str]:
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
-            code = loaded(words[1:]) if words[0] == "load" else command(words)
+            code = READ[words[0]](words[1:]) if words[0] in READ else command(words)
         except SystemExit as end:
             code = int(end.code or 0)
     said = err.getvalue()
     if code == 1 and not said and isinstance(json.loads(out.getvalue()), dict):
         said = "stationkeep: told in the JSON\n"
     return code, said
+
+
+def refused(error: InputError) -> int:
+    """Say what a command would say, and return its exit code."""
+    print(f"stationkeep: {error}", file=sys.stderr)
+    return 2
+
+
+def states(words: list[str]) -> int:
+    """Read states from the command line or a file, as `offline` does."""
+    text, path = (words[1:], None) if words[0] == "--state" else (None, Path(words[1]))
+    try:
+        initial_states(argparse.Namespace(state=text, states=path), SHIPPED)
+    except InputError as error:
+        return refused(error)
+    return 0
 
 
 def loaded(words: list[str]) -> int:
@@ -79,9 +96,12 @@ def loaded(words: list[str]) -> int:
     try:
         Scenario.load(names[0] if names else "bluerov2-heavy", sets).setup()
     except InputError as error:
-        print(f"stationkeep: {error}", file=sys.stderr)
-        return 2
+        return refused(error)
     return 0
+
+
+READ: dict[str, Callable[[list[str]], int]] = {"load": loaded, "states": states}
+SHIPPED = Scenario.load()
 
 
 def fault_of(code: int, said: str) -> str | None:
