@@ -3,8 +3,7 @@
 python benchmarks/kills.py [--kills N] [--seed N]
 
 `generate`, `offline`, `sweep` and `compare` take turns. Each is killed (SIGKILL, its workers too) again
-and again, one folder and one cache, until it has been killed its share of times, and then run
-undisturbed. Printed: what is left over then (temporary files, locks, builds), what differs from a run
+and again in one folder, with one cache, until it comes to its end, and then anew. Printed: what is left over then (temporary files, locks, builds), what differs from a run
 that nobody disturbed (rows, values, files), and what was finished before a kill and made anew after it.
 """
 
@@ -119,33 +118,36 @@ def numbers(answer: Any) -> Any:
     return [numbers(entry) for entry in answer] if isinstance(answer, list) else answer
 
 
-def try_command(command: str, n: int, rng: np.random.Generator) -> tuple[int, list[str]]:
-    """Kill a command n times, and return how often it was still there and what is wrong then."""
+def try_command(command: str, n: int, rng: np.random.Generator) -> list[str]:
+    """Kill a command n times, and return what is wrong then."""
     faults: list[str] = []
-    with tempfile.TemporaryDirectory() as one, tempfile.TemporaryDirectory() as other:
-        calm, folder = Path(one), Path(other)
+    with tempfile.TemporaryDirectory() as one:
+        calm = Path(one)
         expected, seconds = finished(command, calm)
-        n_killed, before = 0, dict[str, bytes]()
-        for i in range(n):
-            n_killed += killed(command, folder, float(rng.uniform(0.2, 1.0)) * seconds)
-            now = kept(folder)
-            faults += [
-                f"{command}: '{name}' was lost or made again"
-                for name in before
-                if before[name] != now.get(name)
-            ]
-            before = now
-            print(f"{command}: {i + 1} of {n}", file=sys.stderr, flush=True)
-        answer, _ = finished(command, folder)
-        now = kept(folder)
-        faults += [
-            f"{command}: '{name}' was made again" for name in before if before[name] != now.get(name)
-        ]
-        if numbers(answer) != numbers(expected):
-            faults.append(f"{command}: the answer is another than that of the undisturbed run")
-        faults += [f"{command}: only one has '{name}'" for name in names(calm) ^ names(folder)]
-        faults += [f"{command}: '{name}' is left over" for name in left_over(folder)]
-    return n_killed, faults
+        n_killed = 0
+        while n_killed < n:
+            with tempfile.TemporaryDirectory() as other:
+                folder, before = Path(other), dict[str, bytes]()
+                while n_killed < n and killed(command, folder, float(rng.uniform(0.1, 0.9)) * seconds):
+                    n_killed += 1
+                    before, found = compared(command, before, kept(folder))
+                    faults += found
+                    print(f"{command}: {n_killed} of {n}", file=sys.stderr, flush=True)
+                answer, _ = finished(command, folder)
+                faults += compared(command, before, kept(folder))[1]
+                if numbers(answer) != numbers(expected):
+                    faults.append(f"{command}: the answer is another than that of the undisturbed run")
+                faults += [f"{command}: only one has '{name}'" for name in names(calm) ^ names(folder)]
+                faults += [f"{command}: '{name}' is left over" for name in left_over(folder)]
+    return faults
+
+
+def compared(
+    command: str, before: dict[str, bytes], now: dict[str, bytes]
+) -> tuple[dict[str, bytes], list[str]]:
+    """Return what is kept now, and what was kept before and is not, or was made again."""
+    lost = [name for name in before if before[name] != now.get(name)]
+    return now, [f"{command}: '{name}' was lost or made again" for name in lost]
 
 
 def main() -> int:
@@ -156,8 +158,9 @@ def main() -> int:
     options = parser.parse_args()
     rng, faults = np.random.default_rng(options.seed), list[str]()
     for command in WORDS:
-        n_killed, found = try_command(command, options.kills // len(WORDS), rng)
-        print(f"{command:<10}{n_killed:>4} kills{len(found):>4} faults", flush=True)
+        n = options.kills // len(WORDS)
+        found = try_command(command, n, rng)
+        print(f"{command:<10}{n:>4} kills{len(found):>4} faults", flush=True)
         faults += found
     for fault in faults:
         print(fault)

@@ -71,12 +71,10 @@ def _run(options: argparse.Namespace) -> int:
     try:
         module = importlib.import_module(f".commands.{options.command}", __package__)
         return int(module.run(options))
-    except InputError as error:
-        print(f"stationkeep: {error}", file=sys.stderr)
-        return 2
     except StationkeepError as error:
-        print(f"stationkeep: {error}", file=sys.stderr)
-        return 1
+        # a user's words may have lines of their own
+        print(f"stationkeep: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2 if isinstance(error, InputError) else 1
     except BrokenPipeError:
         raise
     except Exception as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat
 
 from ..symbolic import Problem
 from ..symbolic.toml import Settings
@@ -46,7 +46,7 @@ class OfflineSettings(Settings):
     rounds: Annotated[int, Field(ge=1, le=100)] = 5
     starts: Annotated[int, Field(ge=0, le=1000)] = 4
     method: Method = "newton"
-    max_iterations: PositiveInt = 10_000
+    max_iterations: Annotated[int, Field(ge=1, le=10**9)] = 10_000
     max_seconds: PositiveFloat = 300.0
     value_tolerance: PositiveFloat = 1e-7
     defect_tolerance: PositiveFloat = 1e-6

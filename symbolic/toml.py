@@ -21,7 +21,7 @@ class Settings(BaseModel):
     @field_validator("*", mode="before")
     @classmethod
     def _no_words_for_numbers(cls, value: Any, info: ValidationInfo) -> Any:
-        """Refuse a text or a truth value where a number belongs: pydantic would make one of it."""
+        """Refuse texts and truth values for numbers, and numbers for these: pydantic would convert."""
         annotation = cls.model_fields[str(info.field_name)].annotation
         kinds = _kinds(annotation)
         numbers = kinds & {int, float} if _fits(annotation, value) else set()
@@ -29,6 +29,8 @@ class Settings(BaseModel):
             if numbers == {int}:
                 raise PydanticKnownError("int_type")
             raise PydanticKnownError("float_type")
+        if bool in kinds and not numbers and type(value) in (int, float):
+            raise PydanticKnownError("bool_type")
         return value
 
 

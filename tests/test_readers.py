@@ -172,6 +172,8 @@ def test_a_set_has_one_key(text: str, one_sentence: Check) -> None:
     [
         ("simulation.duration='10'", ["simulation.duration", "'10'", "number"]),
         ("simulation.duration=true", ["simulation.duration", "True", "number"]),
+        ("learner.safeguard=1", ["learner.safeguard", "true or false"]),
+        ("simulation.chi=1e9", ["simulation.chi", "1000000"]),
         ("samples.number='5'", ["samples.number", "integer"]),
         ("samples.number=true", ["samples.number", "integer"]),
         ("game.R=[1,1,1,true,1,1]", ["game.R", "number"]),
@@ -201,6 +203,11 @@ def test_types_bounds_and_keys_that_go_together(
         Scenario.load(overrides=[override])
     text = one_sentence(caught.value)
     assert all(word in text for word in words), text
+
+
+def test_a_set_of_several_lines_is_answered_in_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "--set", "\n"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_what_nobody_foresaw_is_a_sentence_with_the_place_of_its_traceback(

@@ -156,6 +156,17 @@ def test_flipped_bits_are_read_or_refused_in_one_sentence(
             one_sentence(error)
 
 
+def test_a_name_that_is_no_text_is_refused(copy: Path, one_sentence: Check) -> None:
+    """As one flipped bit makes it of an attribute's name."""
+    with h5py.File(copy, "a") as file:
+        name = b"mod\xe5"
+        space = h5py.h5s.create(h5py.h5s.SCALAR)
+        h5py.h5a.create(file.id, name, h5py.h5t.NATIVE_INT32, space)
+    with pytest.raises(InputError, match="can't be read") as caught:
+        load(copy)
+    one_sentence(caught.value)
+
+
 def test_a_damaged_record_is_made_again(record: Path, copy: Path) -> None:
     scenario = Scenario.load(f"{record.parent}/plant.py:problem", ["simulation.duration=0.6"])
     first = contender_record(scenario, "linear", copy.with_name("linear.nc"))

@@ -34,7 +34,7 @@ class RunSettings(Settings):
     mode: Literal["game", "disturbed"] = "game"
     control_period: Annotated[float, Field(ge=1e-5, le=1e4)] = 0.02
     tolerance: Annotated[float, Field(gt=0.0, lt=1e-2)] = 1e-8
-    chi: PositiveFloat = BOUND
+    chi: Annotated[float, Field(gt=0.0, le=1e6)] = BOUND
     monitor_period: PositiveFloat = 1.0
     seed: Seed = 1
 

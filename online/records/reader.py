@@ -94,6 +94,7 @@ def _variables(file: Any) -> Iterator[tuple[str, Any]]:
         created = data.id.get_create_plist()
         if not {created.get_filter(i)[0] for i in range(created.get_nfilters())} <= FILTERS:
             raise _ForeignError(f"'{name}' needs a filter that is no part of HDF5")
+        name.encode()
         total += int(np.prod(data.shape, dtype=float)) * data.dtype.itemsize
         if total > LARGEST:
             raise _ForeignError(f"its variables take more than {LARGEST / 2**30:g} GiB")
@@ -124,4 +125,6 @@ def _attributes(holder: Any) -> dict[str, Any]:
         for name, value in holder.attrs.items()
         if name not in OWN and not name.startswith("_N")
     }
+    for name, value in found.items():  # in a damaged file they are no Unicode, and no tool writes them
+        f"{name}{value if value.dtype.kind in 'OU' else ''}".encode()
     return {name: value.item() if value.size == 1 else value for name, value in found.items()}

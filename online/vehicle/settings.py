@@ -20,6 +20,7 @@ USED = {  # by the kind of a disturbance
         *("wave_height", "wave_period", "wave_heading", "depth", "peak_enhancement", "seed"),
     },
 }
+Deviation = Annotated[float, Field(ge=0.0, le=1e6)]
 ZERO_SIX: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -75,10 +76,10 @@ class NoiseSettings(Settings):
     seed : of the noise
     """
 
-    position: NonNegativeFloat = 0.0
-    attitude: NonNegativeFloat = 0.0
-    velocity: NonNegativeFloat = 0.0
-    rate: NonNegativeFloat = 0.0
+    position: Deviation = 0.0
+    attitude: Deviation = 0.0
+    velocity: Deviation = 0.0
+    rate: Deviation = 0.0
     seed: Seed = 1
 
 

@@ -78,6 +78,13 @@ class Vehicle(Settings):
             return self
         return validate(Vehicle, self.model_dump(mode="json") | dict(parameters), where)
 
+    @field_validator("name", "source")
+    @classmethod
+    def _readable(cls, text: str) -> str:
+        if not text.strip() or not text.isprintable():
+            raise ValueError(f"is {text!r}, but must be words that can be printed")
+        return text
+
     @field_validator("inertia", "added_mass", mode="before")
     @classmethod
     def _square(cls, value: object, info: ValidationInfo) -> object:
