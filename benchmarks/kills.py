@@ -3,8 +3,9 @@
 python benchmarks/kills.py [--kills N] [--seed N]
 
 `generate`, `offline`, `sweep` and `compare` take turns. Each is killed (SIGKILL, its workers too) again
-and again in one folder, with one cache, until it comes to its end, and then anew. Printed: what is left over then (temporary files, locks, builds), what differs from a run
-that nobody disturbed (rows, values, files), and what was finished before a kill and made anew after it.
+and again in one folder, with one cache, until it comes to its end, and then anew. Printed: what is left
+over then (temporary files, locks, builds), what differs from a run that nobody disturbed (rows, values,
+files), and what was finished before a kill and made anew after it.
 """
 
 from __future__ import annotations
