@@ -14,9 +14,10 @@ _KEY = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)((?:\[\d+\])*)")
 def override(data: dict[str, Any], text: str) -> None:
     """Put "section.key=value", as `--set` takes it, into the data of a scenario; raises InputError."""
     key, separator, value = text.partition("=")
+    where = f"--set {text if text.isprintable() else repr(text)}"
     if not separator or not key.strip():
-        raise InputError(f"--set {text}: write section.key=value, for instance game.gamma=3")
-    replace_value(data, key.strip(), parse_value(value), f"--set {text}")
+        raise InputError(f"{where}: write section.key=value, for instance game.gamma=3")
+    replace_value(data, key.strip(), parse_value(value), where)
 
 
 def parse_value(text: str) -> Any:
