@@ -87,6 +87,7 @@ def test_a_folder_that_nobody_can_write(capsys: Capture) -> None:
     assert "can't be written" in answer.sentence()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["online", "offline"])
 def test_a_full_disk(command: str, record: Path, user_folder: Path) -> None:
     """No file may grow beyond 10 kB: a record doesn't fit, but says so and leaves nothing."""
@@ -102,6 +103,7 @@ def test_a_full_disk(command: str, record: Path, user_folder: Path) -> None:
     assert files_in(user_folder) == []
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_keeps_the_older_record(record: Path, user_folder: Path) -> None:
     (user_folder / "out").mkdir()
     kept = shutil.copy(record, user_folder / "out" / "learned.nc")

@@ -104,6 +104,7 @@ def test_without_a_compiler_everything_works_and_says_so_once(tmp_path: Path) ->
     assert not cache.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", [["--json"], []])
 def test_a_terminal_that_knows_only_ascii(form: list[str], tmp_path: Path) -> None:
     env = os.environ | {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}

@@ -30,6 +30,7 @@ def test_played_worst_case_costs_what_was_solved_for() -> None:
     assert errors[1] < 0.5 * errors[0]
 
 
+@pytest.mark.slow
 def test_played_force_is_the_path_at_its_points_and_zero_afterwards() -> None:
     problem = quick_scenario().station_keeping().problem
     path = WorstCaseSolver(ControlPolicy(problem, linear_policy(problem))).solve(ZETA).path

@@ -78,6 +78,7 @@ def test_long_horizon_is_the_optimal_policy() -> None:
     np.testing.assert_allclose(policy.u_disturbance, expected.u_disturbance, rtol=1e-4, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_longer_horizons_are_better_than_the_linear_policy() -> None:
     """One more second takes part of the excess away; both are above the optimum, below linear."""
     scenario = quick_scenario("simulation.duration=40")
@@ -151,6 +152,7 @@ def test_pid_has_no_steady_error_in_a_current_and_the_linear_policy_has() -> Non
     assert leaning.zeta[-1][0] > 0.5
 
 
+@pytest.mark.slow
 def test_pid_does_not_wind_up() -> None:
     """Held back with a demand beyond the thrusters, the integral stays; it decays with the error."""
     station = quick_scenario().station_keeping()

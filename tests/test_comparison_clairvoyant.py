@@ -43,6 +43,7 @@ def test_the_stage_is_the_plant_of_the_runs(settings: tuple[str, ...], driven: s
         assert running == pytest.approx(rates[12], rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [WAVES, CURRENT], ids=["waves", "current"])
 def test_no_policy_costs_less_and_the_plant_agrees(settings: tuple[str, ...]) -> None:
     scenario = quick_scenario(*settings)
@@ -61,6 +62,7 @@ def test_no_policy_costs_less_and_the_plant_agrees(settings: tuple[str, ...]) ->
     assert record["time"].values[-1] == pytest.approx(4.0)
 
 
+@pytest.mark.slow
 def test_its_record_is_kept_for_its_run_and_can_be_replayed(tmp_path: Path) -> None:
     path, scenario = tmp_path / "clairvoyant.nc", quick_scenario(*SEA, "simulation.duration=1")
     first = clairvoyant_record(scenario, path)

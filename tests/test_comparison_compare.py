@@ -96,6 +96,7 @@ def test_the_size_of_a_run_is_that_of_the_scaled_state(study: Study) -> None:
     assert (run.position_rms, run.effort, run.energy, run.peak_thrust) == (None, None, None, None)
 
 
+@pytest.mark.slow
 def test_a_report_of_a_problem_says_nothing_of_vehicles(study: Study) -> None:
     report = study.write_report()
     assert report == study.out / "report.html"

@@ -57,6 +57,7 @@ def test_a_problem_or_a_function_that_makes_one(file: Path) -> None:
     assert "mpc" not in available(one.setup())  # it needs inverse dynamics
 
 
+@pytest.mark.slow
 def test_no_state_is_a_pitch(file: Path) -> None:
     """Six double integrators at q_5 = 2 m: beyond 90 degrees, were it a vehicle's pitch."""
     state = "simulation.initial_state=[0,0,0,0,2,0,0,0,0,0,0,0]"

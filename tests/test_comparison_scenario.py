@@ -172,6 +172,7 @@ def test_trim_of_a_vehicle_that_is_not_neutral() -> None:
     assert expected[2] == pytest.approx(-0.98)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overrides", [("vehicle=bluerov2-heavy-buoyant",), ("current=[0.2, 0.1, 0]",)])
 def test_trimmed_scenarios_stay_at_their_station(overrides: tuple[str, ...]) -> None:
     """From the station itself nothing moves: the trim is applied, and is no part of u_1."""

@@ -57,7 +57,7 @@ def runs(text: str, folder: Path, seconds: float) -> None:
     assert done.returncode == 0, done.stderr
 
 
-QUICK = ("README", "problem")  # pages whose blocks run every time
+QUICK = ("problem",)  # pages whose blocks run every time
 
 
 def is_slow(page: Path) -> bool:

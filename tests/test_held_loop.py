@@ -97,14 +97,8 @@ def test_a_vehicle_that_the_period_cannot_hold_is_refused_in_one_sentence(tmp_pa
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "lauv",
-        "saga",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("girona500", "videoray")),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["lauv", "girona500", "saga", "videoray"])
 def test_predictions_of_vehicles_with_fast_modes_are_accurate(name: str) -> None:
     listed = {
         c.name: c for c in numerical_conditions(Scenario.load(VEHICLES / f"{name}-scenario.toml"))

@@ -87,6 +87,7 @@ def test_the_error_of_the_mesh_is_what_refinement_takes_away() -> None:
     assert abs(better.value - value) <= 1e-7 * value < abs(rough.value - value)
 
 
+@pytest.mark.slow
 def test_without_disturbance_and_in_time_it_is_the_optimum_of_one_player(
     reference_problem: Problem,
 ) -> None:

@@ -44,6 +44,7 @@ def remembering(entry: float, n_steps: int = 40) -> Learner:
     return taught
 
 
+@pytest.mark.slow
 def test_remembered_weights_are_optimal_in_the_whole_envelope() -> None:
     """V* = ζ_1^2 / 2 + ζ_2^2 from states that the vehicle never came near."""
     taught = remembering(1e-3, n_steps=100)
@@ -72,6 +73,7 @@ def test_remembered_weights_do_not_move_the_policy() -> None:
 COSTATE = ("learner.error=costate", "learner.safeguard=true", "learner.steps=100")
 
 
+@pytest.mark.slow
 def test_a_record_keeps_what_was_remembered(tmp_path: Path) -> None:
     scenario = quick_scenario(*COSTATE, "samples.remember=true", "simulation.duration=4")
     history = run(scenario)

@@ -143,6 +143,7 @@ def test_jacobians_of_the_model(model: Model) -> None:
         assert np.linalg.norm(np.column_stack(columns) - g_zeta) < 1e-7 * np.linalg.norm(g_zeta)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_every_value_function_is_its_source(functions: ValueFunctions) -> None:
     """σ, σ', the policies and the sample kernel, for each basis."""
