@@ -189,11 +189,6 @@ def test_a_set_has_one_key(text: str, one_sentence: Check) -> None:
         ("samples.seed=9223372036854775808", ["samples.seed"]),
         ("game.gamma=1e9", ["game.gamma", "1000000"]),
         ("simulation.disturbance.kind='waves'", ["'waves'", "mode is 'game'", "disturbed"]),
-        (
-            "simulation={mode='disturbed', disturbance={kind='waves', velocity=[1,0,0]}}",
-            ["velocity", "'waves'", "kind 'current'"],
-        ),
-        ("simulation={mode='disturbed', disturbance={force=[1,0,0,0,0,0]}}", ["force", "'none'"]),
     ],
 )
 def test_types_bounds_and_keys_that_go_together(

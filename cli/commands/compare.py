@@ -88,7 +88,7 @@ def _other_optimum(study: Study) -> dict[str, Any] | None:
         return None
     attributes = study.reference.record.attrs
     names = ("value", *CLAIRVOYANT_CHECK, "rounds", "intervals", "iterations", "seconds")
-    numbers = {name: attributes[name].item() for name in names}
+    numbers = {name: float(attributes[name]) for name in names}
     return {name: None if number != number else number for name, number in numbers.items()}
 
 

@@ -11,15 +11,6 @@ from ..loop import RunSettings
 
 Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
-USED = {  # by the kind of a disturbance
-    "none": set[str](),
-    "constant": {"force", "start"},
-    "sinusoid": {"force", "frequency", "start"},
-    "current": {"velocity", "start"},
-    "waves": {
-        *("wave_height", "wave_period", "wave_heading", "depth", "peak_enhancement", "seed"),
-    },
-}
 Deviation = Annotated[float, Field(ge=0.0, le=1e6)]
 ZERO_SIX: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -53,17 +44,6 @@ class DisturbanceSettings(Settings):
     depth: PositiveFloat = 3.0
     peak_enhancement: Annotated[float, Field(ge=1.0)] = 3.3
     seed: Seed = 1
-
-    @model_validator(mode="after")
-    def _used(self) -> DisturbanceSettings:
-        for name in sorted(self.model_fields_set - USED[self.kind] - {"kind"}):
-            if getattr(self, name) != type(self).model_fields[name].default:
-                uses = [kind for kind, used in USED.items() if name in used]
-                raise ValueError(
-                    f"{name} is {getattr(self, name)}, but a disturbance of kind '{self.kind}' has none"
-                    f"; leave it out, or choose kind {' or '.join(map(repr, uses))}"
-                )
-        return self
 
 
 class NoiseSettings(Settings):

@@ -240,7 +240,7 @@ def _is_dead(left: Path) -> bool:
     """Whether a build's folder is that of a process of this machine that is no more."""
     host, _, rest = left.name.removeprefix(_TEMPORARY).partition("-")
     number = rest.partition("-")[0]
-    if host != _HOST or not number.isdigit() or os.name == "nt":
+    if host != _HOST or not number.isdigit() or os.name == "nt" or not hasattr(os, "kill"):
         return False
     try:
         os.kill(int(number), 0)
