@@ -48,6 +48,11 @@ class GammaTooSmallError(InputError):
         super().__init__(f"gamma = {gamma:g} is too small: {reason}; increase gamma")
 
 
+def is_told(times: int) -> bool:
+    """Return whether a message that comes again and again is told this time: at 1, 10, 100, ..."""
+    return str(times).rstrip("0") == "1"
+
+
 def nearest(given: str, known: Iterable[str]) -> str:
     """Return a half-sentence that names the known word nearest to `given`."""
     words = {word.lower(): word for word in sorted(known)}

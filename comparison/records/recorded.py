@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from ...symbolic import InputError
 from ...symbolic.arrays import Array
 from ...symbolic.pyfile import is_named
 from ...symbolic.toml import validate
-from ..policies import CONTENDERS, AnyPolicy
+from ..policies import CONTENDERS
 from ..scenario import Scenario, restored
 from .clairvoyant import KIND as CLAIRVOYANT
 from .clairvoyant import clairvoyant_or_failure, clairvoyant_provenance
@@ -113,10 +112,10 @@ def run_again(
         tell = None if progress is None else lambda t: progress(t / duration)
         if program is not None and policy is None:
             return played_back(record, scenario, tell)
-        make: Callable[[Scenario], AnyPolicy] = lambda one: CONTENDERS[kind].make(one)  # noqa: E731
-        own = list[str]()
         if policy is not None:
             scenario, make, own = with_program(record, scenario, policy)
+        else:
+            make, own = CONTENDERS[kind].make, list[str]()
         return online_record(scenario, policy=lambda: make(scenario), kind=kind, own=own, progress=tell)
     if kind == CLAIRVOYANT:
         return clairvoyant_or_failure(scenario, clairvoyant_provenance(scenario))

@@ -26,7 +26,7 @@ def problem_defaults(problem: Problem) -> dict[str, dict[str, Any]]:
     """Return groups of settings that fit the time scales of a problem."""
     shipped, loop = LearnerSettings(), SimulationSettings()
     tau = DECAY / problem.decay_rate
-    fastest = float(np.abs(problem.closed_loop_modes).max())
+    fastest = problem.fastest_rate
     period = _rounded(HELD / fastest)
     learning = period * max(round(PERIOD * tau / period), 1)
     horizon = _rounded(shipped.horizon * tau)

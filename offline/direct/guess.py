@@ -26,7 +26,7 @@ class LinearStart:
     def __init__(self, problem: Problem, *, compiled: bool = True) -> None:
         self.problem = problem
         self._compiled = compiled
-        self.longest_step = 0.6 / float(np.abs(problem.closed_loop_modes).max())
+        self.longest_step = 0.6 / problem.fastest_rate
 
     def sample(self, zeta0: Array, times: Array) -> tuple[Array, Array, Array]:
         """Return states (N, n), v (N, k) and ζ_dot (N, n) at ascending times > 0.

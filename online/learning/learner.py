@@ -10,6 +10,7 @@ import numpy as np
 
 from ...symbolic import Basis, Game, InputError, Problem, ValueFunctions
 from ...symbolic.arrays import Array
+from ...symbolic.errors import is_told
 from ...symbolic.game import require_time_step
 from ..laws import Critic, actor_step
 from ..paper import Residual, value
@@ -165,7 +166,7 @@ class Learner:
         if before:
             vars(self.law).update(before)
         self.rolled_back += 1
-        if str(self.rolled_back).rstrip("0") == "1":
+        if is_told(self.rolled_back):
             logger.warning(
                 "a learning step would not have been finite and was not taken (%d so far)",
                 self.rolled_back,

@@ -17,8 +17,7 @@ def paid_share(problem: Problem, period: float) -> float:
     1 - E[ζ(T)'P ζ(T)] / E[ζ(0)'P ζ(0)] of the linearised game, for a start that is uniform in the
     envelope: E[ζζ'] is proportional to the squares of its half-widths.
     """
-    A, B = problem.linearization
-    after = scipy.linalg.expm((A + B @ problem.linear_gain) * period)
+    after = scipy.linalg.expm(problem.closed_loop * period)
     spread = np.diag(problem.scale**2)
     left = float(np.trace(after.T @ problem.P @ after @ spread))
     return 1.0 - left / float(np.trace(problem.P @ spread))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...symbolic import InputError, Problem
 from ...symbolic.arrays import Array
-from ...symbolic.game import MEAN_FROM, fastest_mode, held_loop, longest_period, mean_matrix
+from ...symbolic.game import MEAN_FROM, can_hold, fastest_mode, longest_period, mean_matrix
 
 
 class MeanState:
@@ -35,7 +35,7 @@ def require_held(problem: Problem, period: float) -> None:
     The sentence names the fastest mode of the closed loop, the state that it moves, and the period
     that the game needs. A problem without the players' shared input has no such loop to look at.
     """
-    if not problem.same_inputs or held_loop(problem, period).holds:
+    if not problem.same_inputs or can_hold(problem, period):
         return
     fastest, state = fastest_mode(problem)
     raise InputError(

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...symbolic import InputError
+from ...symbolic.compiled import is_gone
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,23 +96,11 @@ def remove_temporaries(folder: Path, pattern: str) -> None:
 
 def remove_abandoned(folder: Path) -> None:
     """Remove what runs of this machine that are no more left in a folder, and in those in it."""
-    if os.name == "nt" or not hasattr(os, "kill"):  # where asking for a process may end it
-        return
     for path in (*folder.glob(".*-*-*"), *folder.glob("*/.*-*-*")):
         match = _TEMPORARY.search(path.name)
-        if match is not None and not _is_alive(int(match[1])):
+        if match is not None and is_gone(int(match[1])):
             with contextlib.suppress(OSError):
                 path.unlink()
-
-
-def _is_alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        pass
-    return True
 
 
 def write_text(path: Path, text: str) -> Path:

@@ -30,6 +30,7 @@ from numpy.typing import ArrayLike
 
 from ...symbolic import InputError, StationKeeping
 from ...symbolic.arrays import Array
+from ...symbolic.errors import is_told
 from ...symbolic.game import AngleTracker, longest_hold, require_time_step
 from ...symbolic.underwater import STATE_NAMES, require_pitch_within
 from ...symbolic.value import BOUND
@@ -215,9 +216,8 @@ def require_dt(dt: float) -> float:
 def tell(counts: Counter[str], flags: Flags) -> None:
     """Log flags as warnings, each the first, the 10th, the 100th, ... time."""
     for flag in flags:
-        times = str(counts[flag])
-        if times.rstrip("0") == "1":
-            logger.warning("%s: %s (%s so far)", flag, TOLD[flag], times)
+        if is_told(counts[flag]):
+            logger.warning("%s: %s (%d so far)", flag, TOLD[flag], counts[flag])
 
 
 def _numbers(value: ArrayLike) -> Array | None:

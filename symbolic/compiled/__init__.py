@@ -3,6 +3,7 @@
 from .batch import BatchKernel
 from .compilation import NATIVE_FLAGS, CompilationError, c_source, cache_folder, compile_source
 from .kernel import WITHOUT_COMPILER, Export, Kernel, dense_function, export, say_once
+from .processes import is_gone
 
 __all__ = [
     "NATIVE_FLAGS",
@@ -16,5 +17,6 @@ __all__ = [
     "compile_source",
     "dense_function",
     "export",
+    "is_gone",
     "say_once",
 ]

@@ -29,6 +29,7 @@ from pathlib import Path
 import casadi
 import platformdirs
 
+from .processes import is_gone
 from .trust import why_untrusted
 
 logger = logging.getLogger("stationkeep")
@@ -127,7 +128,7 @@ def compile_source(source: str, flags: tuple[str, ...]) -> Library:
     if compiler is None:
         raise CompilationError("no C compiler was found (cc, gcc, clang)")
     key = _key(source, compiler, flags)
-    folder = cache_folder().expanduser().absolute().resolve()
+    folder = cache_folder().expanduser().resolve()
     fault = why_untrusted(folder)
     if fault is not None:
         raise CompilationError(
@@ -240,15 +241,7 @@ def _is_dead(left: Path) -> bool:
     """Whether a build's folder is that of a process of this machine that is no more."""
     host, _, rest = left.name.removeprefix(_TEMPORARY).partition("-")
     number = rest.partition("-")[0]
-    if host != _HOST or not number.isdigit() or os.name == "nt" or not hasattr(os, "kill"):
-        return False
-    try:
-        os.kill(int(number), 0)
-    except ProcessLookupError:
-        return True
-    except (OSError, OverflowError):
-        return False
-    return False
+    return host == _HOST and number.isdigit() and is_gone(int(number))
 
 
 def _remove(path: Path) -> None:

@@ -9,6 +9,7 @@ from .riccati import game_riccati, gamma_hamiltonian, gamma_star, stabilising_so
 from .sampled import (
     MEAN_FROM,
     HeldLoop,
+    can_hold,
     fastest_mode,
     held_loop,
     longest_hold,
@@ -27,6 +28,7 @@ __all__ = [
     "HeldLoop",
     "InverseDynamics",
     "Problem",
+    "can_hold",
     "fastest_mode",
     "game_riccati",
     "gamma_hamiltonian",

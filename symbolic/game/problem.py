@@ -212,10 +212,15 @@ class Problem:
         return np.asarray(-self.game.R_eff_inverse @ B.T @ self.P)
 
     @cached_property
-    def closed_loop_modes(self) -> NDArray[np.complex128]:
-        """Eigenvalues of A + B `linear_gain`, the linearised game's closed loop [1/s], (n,)."""
+    def closed_loop(self) -> Array:
+        """A + B `linear_gain`, the linearised game's closed loop [1/s], (n, n)."""
         A, B = self.linearization
-        return np.asarray(np.linalg.eigvals(A + B @ self.linear_gain), dtype=np.complex128)
+        return np.asarray(A + B @ self.linear_gain)
+
+    @cached_property
+    def closed_loop_modes(self) -> NDArray[np.complex128]:
+        """Eigenvalues of `closed_loop` [1/s], (n,)."""
+        return np.asarray(np.linalg.eigvals(self.closed_loop), dtype=np.complex128)
 
     @property
     def decay_rate(self) -> float:

@@ -19,6 +19,7 @@ within a period.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,36 +56,58 @@ class HeldLoop:
 
 def held_loop(problem: Problem, period: float) -> HeldLoop:
     """Return the loop under the linear policies, held for `period` [s]."""
-    margin = _gain_margin(problem, period)
-    return HeldLoop(held_radius(problem, period), _bound(problem, period), margin)
+    radius_at = _radius(problem, period)
+    margin = 8.0
+    if not radius_at(margin) < 1.0:
+        margin = _last(lambda factor: radius_at(factor) < 1.0, margin, 40)
+    return HeldLoop(radius_at(1.0), _bound(problem, period), margin)
+
+
+def can_hold(problem: Problem, period: float) -> bool:
+    """Whether a control held for `period` [s] keeps what `HeldLoop.holds` asks for."""
+    return held_radius(problem, period) <= _bound(problem, period)
+
+
+def held_radius(problem: Problem, period: float) -> float:
+    """Return the spectral radius over a period [s]: of both players' loop, and of u_1 alone.
+
+    The larger of the two: nothing needs to disturb.
+    """
+    return _radius(problem, period)(1.0)
+
+
+def _radius(problem: Problem, period: float) -> Callable[[float], float]:
+    """Return the spectral radius as a function of a factor that the gains are multiplied with."""
+    A, B = problem.linearization
+    n, k = B.shape
+    powers = scipy.linalg.expm(period * np.block([[A, B], [np.zeros((k, n + k))]]))
+    gains = (problem.linear_gain, -problem.linear_gains[0])
+
+    def at(factor: float) -> float:
+        closed = (powers[:n, :n] + factor * powers[:n, n:] @ gain for gain in gains)
+        return max(float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in closed)
+
+    return at
 
 
 def _bound(problem: Problem, period: float) -> float:
     return float(np.exp(-MARGIN * problem.decay_rate * period))
 
 
-def held_radius(problem: Problem, period: float, factor: float = 1.0) -> float:
-    """Return the spectral radius with the gains times a factor: of both players, and of u_1 alone.
-
-    The larger of the two: nothing needs to disturb.
-    """
-    A, B = problem.linearization
-    n, k = B.shape
-    powers = scipy.linalg.expm(period * np.block([[A, B], [np.zeros((k, n + k))]]))
-    gains = (problem.linear_gain, -problem.linear_gains[0])
-    closed = (powers[:n, :n] + factor * powers[:n, n:] @ gain for gain in gains)
-    return max(float(np.abs(np.linalg.eigvals(matrix)).max()) for matrix in closed)
+def _last(holds: Callable[[float], bool], most: float, halvings: int) -> float:
+    """Return the largest number below `most` up to which something holds, by bisection."""
+    low, high = 0.0, most
+    for _ in range(halvings):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
 
 
 def longest_period(problem: Problem, most: float) -> float:
     """Return the longest period that holds the game, to two digits and at most `most` [s]."""
-    low, high = 0.0, most
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        holds = held_radius(problem, middle) <= _bound(problem, middle)
-        low, high = (middle, high) if holds else (low, middle)
-    exponent = np.floor(np.log10(low)) - 1.0 if low > 0.0 else 0.0
-    return float(np.floor(low / 10.0**exponent) * 10.0**exponent)
+    longest = _last(lambda period: can_hold(problem, period), most, 40)
+    exponent = np.floor(np.log10(longest)) - 1.0 if longest > 0.0 else 0.0
+    return float(np.floor(longest / 10.0**exponent) * 10.0**exponent)
 
 
 def longest_hold(problem: Problem, most: float) -> float:
@@ -94,11 +117,7 @@ def longest_hold(problem: Problem, most: float) -> float:
     """
     if held_radius(problem, most) < 1.0:
         return most
-    low, high = 0.0, most
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if held_radius(problem, middle) < 1.0 else (low, middle)
-    return low
+    return _last(lambda period: held_radius(problem, period) < 1.0, most, 30)
 
 
 def fastest_mode(problem: Problem) -> tuple[float, str]:
@@ -119,15 +138,4 @@ def fastest_mode(problem: Problem) -> tuple[float, str]:
 
 def mean_matrix(problem: Problem, period: float) -> Array:
     """Return φ_1(A_c h), (n, n), which makes the state its mean over the period [s]."""
-    A, B = problem.linearization
-    return phi_functions((A + B @ problem.linear_gain) * period)[1]
-
-
-def _gain_margin(problem: Problem, period: float) -> float:
-    low, high = 0.0, 8.0
-    if held_radius(problem, period, high) < 1.0:
-        return high
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if held_radius(problem, period, middle) < 1.0 else (low, middle)
-    return low
+    return phi_functions(problem.closed_loop * period)[1]

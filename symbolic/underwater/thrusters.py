@@ -64,6 +64,8 @@ class Thrusters(Settings):
 
         The linear program min s with B T = τ_b and s T_min <= T <= s T_max; above 1 they can't.
         """
+        if not np.any(tau_b):
+            return 0.0
         matrix, n = self.matrix, len(self.allocation[0])
         reverse, forward = self.limits
         eye, one = np.eye(n), np.ones((n, 1))

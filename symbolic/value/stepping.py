@@ -107,8 +107,7 @@ class Exponential:
 
     def __init__(self, problem: Problem, steps: Array) -> None:
         self.steps = steps
-        A, B = problem.linearization
-        self._A, self._P = A + B @ problem.linear_gain, problem.P
+        self._A, self._P = problem.closed_loop, problem.P
         stages = zip(*(stage_matrices(self._A, h) for h in steps), strict=True)
         self.parameters = {"steps": steps[None, :]} | {
             f"stage_{number}": np.hstack(matrices) for number, matrices in enumerate(stages, 2)
@@ -147,7 +146,7 @@ def stepping_of(problem: Problem, horizon: float, n_steps: int) -> RungeKutta | 
     n_steps : N of the growing steps, with which Runge-Kutta is used while it is stable
     """
     steps = growing_steps(horizon, n_steps)
-    fastest = float(np.abs(problem.closed_loop_modes).max())
+    fastest = problem.fastest_rate
     if fastest * steps[-1] <= STABLE:
         return RungeKutta(steps)
     return Exponential(problem, graded_steps(horizon, n_steps, fastest))
