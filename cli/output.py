@@ -35,7 +35,7 @@ class Tell(Protocol):
 
 def load_scenario(options: argparse.Namespace) -> Scenario:
     """Return the scenario of the command line, its vehicle and game checked; raises InputError."""
-    scenario = Scenario.load(options.scenario, options.overrides)
+    scenario = Scenario.load(options.scenario, options.overrides, getattr(options, "vary", ()))
     scenario.setup()
     scenario.initial_weights()
     scenario.critic_law()

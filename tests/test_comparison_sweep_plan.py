@@ -61,28 +61,41 @@ def test_samplers_fill_the_cube_as_they_promise() -> None:
 
 
 def test_ranges() -> None:
-    log = parse_vary("game.gamma=1.2:120:log", SCENARIO)
+    (log,) = parse_vary(["game.gamma=1.2:120:log"], SCENARIO)
     assert isinstance(log, Range)
     assert log.at(0.0) == pytest.approx(1.2)
     assert log.at(0.5) == pytest.approx(12.0)
-    count = parse_vary("samples.seed=1:4", SCENARIO)
+    (count,) = parse_vary(["samples.seed=1:4"], SCENARIO)
     assert isinstance(count, Range)
     found = [count.at(unit) for unit in np.arange(400) / 400]
     assert [found.count(value) for value in (1, 2, 3, 4)] == [100] * 4
     assert all(isinstance(value, int) for value in found)
-    negative = parse_vary("simulation.initial_state[0]=-0.5:.5", SCENARIO)
+    (negative,) = parse_vary(["simulation.initial_state[0]=-0.5:.5"], SCENARIO)
     assert isinstance(negative, Range)
     assert (negative.low, negative.high) == (-0.5, 0.5)
 
 
 def test_values_are_read_as_in_toml_or_as_words() -> None:
-    words = parse_vary("basis.name=quadratic,drag", SCENARIO)
+    (words,) = parse_vary(["basis.name=quadratic,drag"], SCENARIO)
     assert words == Choices("basis.name", ("quadratic", "drag"))
-    arrays = parse_vary("current=[0.1,0,0],[0.2,0,0]", SCENARIO)
+    (arrays,) = parse_vary(["current=[0.1,0,0],[0.2,0,0]"], SCENARIO)
     assert arrays == Choices("current", ([0.1, 0, 0], [0.2, 0, 0]))
-    assert parse_vary("learner.safeguard=true,false", SCENARIO) == Choices(
-        "learner.safeguard", (True, False)
-    )
+    (truths,) = parse_vary(["learner.safeguard=true,false"], SCENARIO)
+    assert truths == Choices("learner.safeguard", (True, False))
+
+
+def test_settings_that_only_go_together() -> None:
+    """A disturbance belongs to one mode: neither key can be varied by itself."""
+    kinds, modes = "simulation.disturbance.kind=current,waves", "simulation.mode=disturbed"
+    for texts in ([kinds, modes], [modes, kinds]):
+        assert {one.key for one in parse_vary(texts, SCENARIO)} == {
+            "simulation.disturbance.kind",
+            "simulation.mode",
+        }
+    with pytest.raises(InputError, match="second player's"):
+        parse_vary([kinds], SCENARIO)
+    with pytest.raises(InputError, match="did you mean 'gamma'"):
+        parse_vary([modes, "game.gama=2,3"], SCENARIO)
 
 
 def test_keys_say_what_the_numbers_depend_on() -> None:
@@ -175,7 +188,7 @@ BAD = [
 @pytest.mark.parametrize(("text", "words"), BAD)
 def test_bad_settings(text: str, words: str, one_sentence: Callable[[BaseException], str]) -> None:
     with pytest.raises(InputError) as caught:
-        parse_vary(text, SCENARIO)
+        parse_vary([text], SCENARIO)
     assert words in one_sentence(caught.value)
 
 

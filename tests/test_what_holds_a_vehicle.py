@@ -4,6 +4,7 @@ degrees."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from stationkeep.comparison.records import closed_loop
 from stationkeep.comparison.theory.vehicle_conditions import trim_condition
 from stationkeep.symbolic import InputError, Vehicle
 
+SHIPPED = Path(str(resources.files("stationkeep.comparison.scenario"))) / "scenarios"
 Check = Callable[[BaseException], str]
 
 
@@ -81,3 +83,41 @@ def test_a_disturbance_of_the_game_is_refused(one_sentence: Check) -> None:
     with pytest.raises(InputError, match="second player") as caught:
         Scenario.load(overrides=sets)
     assert "disturbed" in one_sentence(caught.value)
+
+
+DISTURBED = "simulation.mode=disturbed"
+CURRENT = "simulation.disturbance.kind=current"
+WAVE = "simulation.disturbance.wave_height=1"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ([WAVE], "kind = 'none' has no use for it"),
+        ([DISTURBED, CURRENT, WAVE], "kind = 'current' has no use for it"),
+        (["learner.rule=gradient", "learner.forgetting=1"], "'learner.forgetting'"),
+        (["learner.normalizer=paper"], "error = 'costate'"),
+    ],
+)
+def test_a_key_that_the_choice_has_no_use_for(
+    overrides: list[str], words: str, one_sentence: Check
+) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        Scenario.load(overrides=overrides)
+    assert "leave it out" in one_sentence(caught.value)
+
+
+def test_keys_of_another_choice_that_may_stay(tmp_path: Path) -> None:
+    """Where a command chooses another kind than the file, the file's keys stay as they are."""
+    text = (SHIPPED / "bluerov2-heavy.toml").read_text(encoding="utf-8")
+    text = text.replace('mode = "game"', 'mode = "disturbed"')
+    lines = "[simulation.disturbance]\nkind = 'current'\nvelocity = [0.1, 0, 0]\n"
+    file = tmp_path / "current.toml"
+    file.write_text(text + lines)
+    assert Scenario.load(file).simulation.disturbance.kind == "current"
+    other = "simulation.disturbance.kind=waves"
+    assert Scenario.load(file, [other, WAVE]).simulation.disturbance.wave_height == 1.0
+    file.write_text(file.read_text(encoding="utf-8") + "wave_height = 1\n")
+    with pytest.raises(InputError, match="wave_height"):
+        Scenario.load(file)
+    Scenario.load(file, varied=[other])

@@ -73,6 +73,19 @@ def replace_value(data: dict[str, Any], key: str, value: Any, where: str) -> Non
     data[last] = _with_entry(data.get(last), entries, value, f"{where}: '{key}'")
 
 
+def keys_of(data: dict[str, Any], above: str = "") -> set[str]:
+    """Return the keys of nested tables, "section.key"."""
+    found = set()
+    for key, value in data.items():
+        found |= keys_of(value, f"{above}{key}.") if isinstance(value, dict) else {f"{above}{key}"}
+    return found
+
+
+def key_in(text: str) -> str:
+    """Return the key of "section.key[i]=value"."""
+    return text.partition("=")[0].partition("[")[0].strip()
+
+
 def value_at(data: dict[str, Any], key: str) -> Any:
     """Return what is at `key` in nested tables, None where there is nothing."""
     match = _KEY.fullmatch(key)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel
 
-from ...online import SimulationSettings
+from ...online import DisturbanceSettings, LearnerSettings, SimulationSettings
 from ...symbolic import InputError
 from ...symbolic.arrays import Array
+from .overrides import key_in
 
 VEHICLE_NEEDS = (
     *(("game", key) for key in ("Q", "R", "gamma")),
@@ -47,11 +48,44 @@ def _vehicle_only(scenario: BaseModel) -> Iterator[str]:
     for group, keys in VEHICLE_ONLY.items():
         holder = getattr(scenario, group) if group else scenario
         for key in keys:
-            default = type(holder).model_fields[key].get_default(call_default_factory=True)
-            if getattr(holder, key) != default:
+            if not _is_default(holder, key):
                 yield f"{group}.{key}" if group else key
     if getattr(scenario, "simulation").mode == "disturbed":  # noqa: B009 - any scenario
         yield "simulation.mode=disturbed"
+
+
+def _is_default(group: BaseModel, key: str) -> bool:
+    default = type(group).model_fields[key].get_default(call_default_factory=True)
+    return bool(getattr(group, key) == default)
+
+
+def require_used(
+    disturbance: DisturbanceSettings,
+    learner: LearnerSettings,
+    given: Collection[str],
+    overrides: Sequence[str],
+    varied: Sequence[str],
+) -> None:
+    """Raise InputError where a key away from its default is given that its group's kind doesn't use.
+
+    Parameters
+    ----------
+    given : keys of the scenario's file and of the overrides
+    overrides : "section.key=value"; where they choose the kind, the file's keys of another may stay
+    varied : "section.key=..." of keys that get other values later, so that nothing is chosen yet
+    """
+    asked, later = ({key_in(text) for text in texts} for texts in (overrides, varied))
+    for group, settings in (("simulation.disturbance", disturbance), ("learner", learner)):
+        for choice, unused in settings.unused().items():
+            chooser = f"{group}.{choice}"
+            held = () if chooser in later else asked if chooser in asked else given
+            away = (key for key in unused if not _is_default(settings, key))
+            found = min((key for key in away if f"{group}.{key}" in held), default=None)
+            if found is not None:
+                raise InputError(
+                    f"'{group}.{found}' is given, but {choice} = '{getattr(settings, choice)}' has no "
+                    f"use for it; leave it out, or choose another {choice}"
+                )
 
 
 def require_one_each(key: str, given: Sequence[float], name: str, n_states: int) -> None:

@@ -24,8 +24,8 @@ from .building import file_in, find_problem, named_in, problem_setup, vehicle_pr
 from .defaults import problem_defaults
 from .files import Files, read_settings
 from .laws import made_law
-from .overrides import override, replace_value
-from .rules import require_keys, require_level, require_one_each, require_start
+from .overrides import keys_of, override, replace_value
+from .rules import require_keys, require_level, require_one_each, require_start, require_used
 from .settings import BasisSettings, EnvelopeSettings, GameSettings
 
 Restore = Callable[[str, Path | None, Files], "Scenario"]
@@ -69,12 +69,16 @@ class Scenario(Settings):
         return self
 
     @classmethod
-    def load(cls, name: str | Path = DEFAULT, overrides: Sequence[str] = ()) -> Scenario:
+    def load(
+        cls, name: str | Path = DEFAULT, overrides: Sequence[str] = (), varied: Sequence[str] = ()
+    ) -> Scenario:
         """Load a shipped scenario by name, a user's by its TOML file, or a problem by "file.py:name".
 
         Parameters
         ----------
         overrides : "section.key=value" settings, values written as in TOML
+        varied : settings that get other values later, "section.key=..."; a key that is of use only
+            then is not refused
 
         Raises
         ------
@@ -84,6 +88,7 @@ class Scenario(Settings):
         data, folder = read_settings(name)
         for text in overrides:
             override(data, text)
+        given = keys_of(data)
         files = Files()
         if isinstance(data.get("problem"), str):
             problem = find_problem(named_in(folder, data["problem"]))
@@ -93,6 +98,7 @@ class Scenario(Settings):
                     data[group] = keys | data.get(group, {})
         scenario = validate(cls, data, f"scenario '{name}'")
         scenario._folder, scenario._files = folder, files
+        require_used(scenario.simulation.disturbance, scenario.learner, given, overrides, varied)
         scenario._require_start()
         return scenario
 

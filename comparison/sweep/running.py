@@ -96,7 +96,7 @@ def sweep(
         If nobody is left to work.
     """
     started = time.monotonic()
-    one = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
+    one = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario, varied=vary)
     require_runnable(one)
     told = progress if progress is not None else _silent
     bench = WorkerSettings(one, records, every)
@@ -104,7 +104,7 @@ def sweep(
     plan = Plan(
         scenario=one,
         policies=tuple(policies),
-        varied=tuple(parse_vary(text, one) for text in [*asked, *vary]),
+        varied=parse_vary([*asked, *vary], one),
         n_points=samples,
         sampling=sampling,
         states=states,

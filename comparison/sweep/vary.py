@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,16 +56,34 @@ class Range:
         return self.low + unit * (self.high - self.low)
 
 
-def parse_vary(text: str, scenario: Scenario) -> Choices | Range:
-    """Return what "key=v1,v2", "key=low:high" or "key=low:high:log" asks for.
+def parse_vary(texts: Sequence[str], scenario: Scenario) -> tuple[Choices | Range, ...]:
+    """Return what "key=v1,v2", "key=low:high" or "key=low:high:log" ask for.
 
-    Every value, and both ends of a range, are tried on the scenario.
+    Every value, and both ends of a range, must be one of the scenario, by itself or with the first
+    values of the others.
 
     Raises
     ------
     InputError
         If there is no such key, or a value breaks a rule.
     """
+    found = tuple(_parsed(text, scenario) for text in texts)
+    first = {one.key: _ends(one)[0] for one in found}
+    for one, text in zip(found, texts, strict=True):
+        for value in _ends(one):
+            try:
+                _try(scenario, {one.key: value}, one.key, f"--vary {text}")
+            except InputError:
+                if not _is_possible(scenario, first | {one.key: value}, one.key):
+                    raise
+    return found
+
+
+def _ends(one: Choices | Range) -> tuple[Any, ...]:
+    return one.values if isinstance(one, Choices) else (one.at(0.0), one.at(1.0))
+
+
+def _parsed(text: str, scenario: Scenario) -> Choices | Range:
     where = f"--vary {text}"
     key, separator, values = (part.strip() for part in text.partition("="))
     if not separator or not key or not values:
@@ -73,8 +91,6 @@ def parse_vary(text: str, scenario: Scenario) -> Choices | Range:
     match = _RANGE.fullmatch(values)
     if match is None:
         chosen = tuple(parse_values(values))
-        for value in chosen:
-            _try(scenario, key, value, where)
         if len({json.dumps(value) for value in chosen}) < len(chosen):
             raise InputError(f"{where}: a value is there twice; leave one out")
         return Choices(key, chosen)
@@ -87,10 +103,7 @@ def parse_vary(text: str, scenario: Scenario) -> Choices | Range:
     integer = isinstance(present, int) and not isinstance(present, bool)
     if integer and (log or low % 1.0 or high % 1.0):
         raise InputError(f"{where}: '{key}' is an integer; give a range of integers without log")
-    found = Range(key, low, high, log, integer)
-    for unit in (0.0, 1.0):
-        _try(scenario, key, found.at(unit), where)
-    return found
+    return Range(key, low, high, log, integer)
 
 
 def varied(scenario: Scenario, settings: Mapping[str, Any], where: str = "scenario") -> Scenario:
@@ -120,8 +133,16 @@ def varied(scenario: Scenario, settings: Mapping[str, Any], where: str = "scenar
     return one
 
 
-def _try(scenario: Scenario, key: str, value: Any, where: str) -> None:
-    one = varied(scenario, {key: value}, where)
+def _is_possible(scenario: Scenario, settings: Mapping[str, Any], key: str) -> bool:
+    try:
+        _try(scenario, settings, key, "")
+    except InputError:
+        return False
+    return True
+
+
+def _try(scenario: Scenario, settings: Mapping[str, Any], key: str, where: str) -> None:
+    one = varied(scenario, settings, where)
     if key.partition(".")[0] in ("vehicle", "plant", "vehicle_parameters"):
         one.model_vehicle()
     if key.startswith(("plant.", "simulation.plant")):

@@ -90,6 +90,17 @@ class LearnerSettings(Settings):
         """Return the settings of the paper's learner, `AS_PRINTED`, with changes."""
         return cls.model_validate(AS_PRINTED | changes)
 
+    def unused(self) -> dict[str, set[str]]:
+        """Return, for each key that chooses among laws, the keys that the choice doesn't use."""
+        found: dict[str, set[str]] = {"rule": set(), "error": set()}
+        if self.rule != "least_squares":
+            found["rule"] = {"forgetting", "covariance", "covariance_bound"}
+        if self.error == "costate":
+            found["error"] = {"normalizer"} | (
+                {"gain_critic"} if self.gain_samples is not None else set()
+            )
+        return found
+
     @field_validator("rule")
     @classmethod
     def _known(cls, rule: str) -> str:

@@ -13,6 +13,13 @@ Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
 Deviation = Annotated[float, Field(ge=0.0, le=1e6)]
 ZERO_SIX: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+USED: dict[str, set[str]] = {  # by each kind of disturbance
+    "none": set(),
+    "constant": {"force", "start"},
+    "sinusoid": {"force", "frequency", "start"},
+    "current": {"velocity", "start"},
+    "waves": {"wave_height", "wave_period", "wave_heading", "depth", "peak_enhancement", "seed"},
+}
 
 
 class DisturbanceSettings(Settings):
@@ -44,6 +51,10 @@ class DisturbanceSettings(Settings):
     depth: PositiveFloat = 3.0
     peak_enhancement: Annotated[float, Field(ge=1.0)] = 3.3
     seed: Seed = 1
+
+    def unused(self) -> dict[str, set[str]]:
+        """Return, for the key that chooses among disturbances, the keys that the choice doesn't use."""
+        return {"kind": set(type(self).model_fields) - {"kind"} - USED[self.kind]}
 
 
 class NoiseSettings(Settings):

@@ -57,9 +57,7 @@ class HeldLoop:
 def held_loop(problem: Problem, period: float) -> HeldLoop:
     """Return the loop under the linear policies, held for `period` [s]."""
     radius_at = _radius(problem, period)
-    margin = 8.0
-    if not radius_at(margin) < 1.0:
-        margin = _last(lambda factor: radius_at(factor) < 1.0, margin, 40)
+    margin = _last(lambda factor: radius_at(factor) < 1.0, 8.0, 40)
     return HeldLoop(radius_at(1.0), _bound(problem, period), margin)
 
 
@@ -95,7 +93,9 @@ def _bound(problem: Problem, period: float) -> float:
 
 
 def _last(holds: Callable[[float], bool], most: float, halvings: int) -> float:
-    """Return the largest number below `most` up to which something holds, by bisection."""
+    """Return the largest number up to `most` until which something holds, by bisection."""
+    if holds(most):
+        return most
     low, high = 0.0, most
     for _ in range(halvings):
         middle = 0.5 * (low + high)
@@ -106,6 +106,8 @@ def _last(holds: Callable[[float], bool], most: float, halvings: int) -> float:
 def longest_period(problem: Problem, most: float) -> float:
     """Return the longest period that holds the game, to two digits and at most `most` [s]."""
     longest = _last(lambda period: can_hold(problem, period), most, 40)
+    if longest == most:
+        return most
     exponent = np.floor(np.log10(longest)) - 1.0 if longest > 0.0 else 0.0
     return float(np.floor(longest / 10.0**exponent) * 10.0**exponent)
 
@@ -115,8 +117,6 @@ def longest_hold(problem: Problem, most: float) -> float:
 
     Where its modes over one period reach the unit circle; `longest_period` keeps a margin from there.
     """
-    if held_radius(problem, most) < 1.0:
-        return most
     return _last(lambda period: held_radius(problem, period) < 1.0, most, 30)
 
 
